@@ -21,6 +21,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, command: &Command) -> anyhow::Result<ExitCode> {
+    let name = command.get_name().to_owned();
     let pages = made(args.folder.join("share/man/man1"))?;
     clap_mangen::generate_to(command.clone(), &pages)
         .with_context(|| format!("cannot write to {}", pages.display()))?;
@@ -28,7 +29,7 @@ pub fn run(args: &Args, command: &Command) -> anyhow::Result<ExitCode> {
     for (shell, place) in SHELLS {
         let folder = made(args.folder.join(place))?;
         let write = || -> std::io::Result<PathBuf> {
-            let written = generate_to(shell, &mut command.clone(), super::NAME, &folder)?;
+            let written = generate_to(shell, &mut command.clone(), &name, &folder)?;
             if shell == Shell::Bash {
                 // Where it loads completions by need, it looks for the program's name alone.
                 let named = written.with_extension("");

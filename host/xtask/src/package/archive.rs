@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use super::About;
+use super::about::About;
 use crate::shell;
 
 /// Packs the folder of `place` that is laid out.

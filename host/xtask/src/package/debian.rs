@@ -5,7 +5,8 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use super::{About, tree};
+use super::about::About;
+use super::tree;
 use crate::setup::{self, Group};
 use crate::shell;
 

@@ -3,6 +3,7 @@
 //! Both hold the program, its manual pages, shell completions, menu entry, icon and the type of STEP files. The Debian package depends on the libraries
 //! of the system that it is made on; the archive brings the CAD kernel along ([`libraries`]), and needs of the system what every desktop has.
 
+mod about;
 mod archive;
 mod debian;
 mod libraries;
@@ -13,6 +14,7 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, bail};
 
+use self::about::About;
 use crate::arguments::Package;
 use crate::setup::{self, Consent, Group};
 use crate::{program, shell};
@@ -58,39 +60,6 @@ fn folder(root: &Path) -> Result<PathBuf> {
     Ok(crate::tidy::target_directory(root)?.join("package"))
 }
 
-/// What both say of the program.
-pub struct About {
-    version: String,
-    /// Time of the last commit, seconds since 1970: two packages of one commit are equal.
-    time: String,
-}
-
-impl About {
-    fn read(root: &Path) -> Result<Self> {
-        let manifest = std::fs::read_to_string(root.join("Cargo.toml"))?;
-        let version = version(&manifest)
-            .context("Cargo.toml names no version")?
-            .to_owned();
-        let mut git = Command::new("git");
-        git.current_dir(root).args(["log", "-1", "--format=%ct"]);
-        // A copy without its history has no commit.
-        let time = shell::read(&mut git).map_or_else(|_| "0".to_owned(), |time| time.trim().to_owned());
-        Ok(Self { version, time })
-    }
-
-    /// Name of the archive's only folder.
-    fn folder(&self) -> String {
-        format!("mortise-{}-{}", self.version, std::env::consts::ARCH)
-    }
-}
-
-/// The version in a workspace's manifest.
-fn version(manifest: &str) -> Option<&str> {
-    let (_, package) = manifest.split_once("[workspace.package]")?;
-    let line = package.lines().find(|line| line.starts_with("version"))?;
-    line.split('"').nth(1)
-}
-
 /// Step `package` of `cargo xtask test`: both are made; the archive, unpacked elsewhere, runs with its own libraries.
 pub fn step(root: &Path, program: &Path) -> Result<String> {
     let made = make(root, program)?;
@@ -118,19 +87,4 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
         bail!("the archive's program does not read the sample:\n{said}");
     }
     Ok(format!("{} packages", made.len()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_version_is_the_workspaces() {
-        let manifest =
-            "[workspace]\nversion = \"9\"\n[workspace.package]\nname = \"x\"\nversion = \"0.1.0\"\n";
-        assert_eq!(version(manifest), Some("0.1.0"));
-        assert_eq!(version("[package]\nversion = \"1\""), None);
-        let own = std::fs::read_to_string(shell::root().unwrap().join("Cargo.toml")).unwrap();
-        assert_eq!(version(&own), Some(env!("CARGO_PKG_VERSION")));
-    }
 }
