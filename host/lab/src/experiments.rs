@@ -2,6 +2,7 @@
 
 use crate::blend::Blend;
 use crate::clearance::Clearance;
+use crate::energy::Energy;
 use crate::experiment::Experiment;
 use crate::hybrid::Hybrid;
 use crate::pareto::Pareto;
@@ -17,6 +18,7 @@ pub const ALL: &[&dyn Experiment] = &[
     &Pareto,
     &Peers,
     &Blend,
+    &Energy,
     &Stability,
     &Rate,
     &Shrink,

@@ -16,6 +16,7 @@ pub mod costs;
 mod crossing_law;
 mod driven;
 pub mod endurance;
+pub mod energy;
 mod error;
 mod exact_fit;
 pub mod experiment;

@@ -194,6 +194,14 @@ pub const ARTEFACTS: &[Artefact] = &[
         sources: &[LAW, SCENARIO, TRIAL, GUIDED, CHART, &["host/lab/src/blend.rs"]],
     },
     Artefact {
+        name: "energy",
+        made: Made::Sweep { quick: false },
+        sources: &[
+            &["host/bake/src", "host/brep/src", "host/energy/src", "host/lab/src/energy"],
+            CHART,
+        ],
+    },
+    Artefact {
         name: "rate",
         made: Made::Sweep { quick: true },
         sources: &[LAW, SCENARIO, TRIAL, GUIDED, CHART, &["host/lab/src/rate.rs"]],

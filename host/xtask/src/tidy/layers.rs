@@ -76,6 +76,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("protocol", &[]),
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
+    ("host/energy", &["mortise-bake", "mortise-brep"]),
     ("host/fit", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/inspect", &["mortise-bake", "mortise-brep", "mortise-task"]),
     (

@@ -1,0 +1,179 @@
+//! Pegs of three sections in blind holes of their own shape, at exact fit: Behandish & Ilieş 2015, fig. 4 (its dimensions are not given; these are ours).
+
+use std::f64::consts::TAU;
+
+use glam::{DAffine3, DVec2, DVec3};
+use mortise_brep::Shape;
+
+use crate::LabError;
+use crate::step_text::StepText;
+
+/// Half width of the block, its height, and the depth of the hole, mm; and the length of the peg.
+const HALF: f64 = 25.0;
+const HEIGHT: f64 = 40.0;
+/// Depth of the holes, mm.
+pub(super) const DEPTH: f64 = 30.0;
+/// Length of the pegs, mm.
+pub(super) const LENGTH: f64 = 45.0;
+/// Radius of the round section, and half the width of the square one, mm.
+const RADIUS: f64 = 10.0;
+/// Corners of a round section: its chords are 12 µm off the circle.
+const CORNERS: usize = 64;
+
+/// A section.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Section {
+    Circular,
+    Square,
+    /// Round on one side, with a corner on the other.
+    Combined,
+}
+
+impl Section {
+    pub const ALL: [Self; 3] = [Self::Circular, Self::Square, Self::Combined];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Circular => "circular",
+            Self::Square => "square",
+            Self::Combined => "combined",
+        }
+    }
+
+    /// Corners, counter-clockwise from above.
+    fn corners(self) -> Vec<DVec2> {
+        let round = |i: usize| {
+            // Halfway between, so that no corner is on a diagonal of the block.
+            DVec2::from_angle(TAU * (i as f64 + 0.5) / CORNERS as f64) * RADIUS
+        };
+        match self {
+            Self::Circular => (0..CORNERS).map(round).collect(),
+            Self::Square => [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
+                .map(|(x, y)| DVec2::new(x, y) * RADIUS)
+                .into(),
+            Self::Combined => {
+                // Three quarters of the circle; the tangents at its ends meet in the corner.
+                let (first, last) = (CORNERS / 4, CORNERS);
+                let mut corners: Vec<DVec2> = (first..last).map(round).collect();
+                corners.push(DVec2::new(RADIUS, 0.0));
+                corners.push(DVec2::splat(RADIUS));
+                corners.push(DVec2::new(0.0, RADIUS));
+                corners
+            }
+        }
+    }
+
+    /// The block, its top at z = 0 and the hole about the z axis, and the peg, its foot at the origin and its length along z.
+    pub fn shapes(self) -> Result<[Shape; 2], LabError> {
+        let mut text = StepText::new();
+        let corners = self.corners();
+        let (block, peg) = (block(&mut text, &corners), prism(&mut text, &corners));
+        text.part("block", block, DAffine3::IDENTITY);
+        text.part("peg", peg, DAffine3::IDENTITY);
+        let model = mortise_brep::load_step(text.file()?.path())?;
+        let shape = |name: &str| {
+            let part = model.parts.iter().find(|part| part.name == name);
+            part.map(|part| model.shapes[part.shape].clone())
+                .ok_or_else(|| LabError::Input {
+                    name: self.name().to_owned(),
+                    what: format!("the {name} was lost while it was read"),
+                })
+        };
+        Ok([shape("block")?, shape("peg")?])
+    }
+}
+
+fn prism(text: &mut StepText, corners: &[DVec2]) -> u64 {
+    let count = corners.len();
+    let at = |z: f64| corners.iter().map(move |p| p.extend(z));
+    let all: Vec<DVec3> = at(0.0).chain(at(LENGTH)).collect();
+    let mut loops = vec![(0..count).rev().collect(), (count..2 * count).collect()];
+    loops.extend((0..count).map(|i| {
+        let next = (i + 1) % count;
+        vec![i, next, count + next, count + i]
+    }));
+    text.polyhedron(&all, &loops)
+}
+
+/// The top is divided from each corner of the hole to the place on the block's border in the same direction.
+fn block(text: &mut StepText, corners: &[DVec2]) -> u64 {
+    let count = corners.len();
+    let mut border: Vec<DVec2> = corners
+        .iter()
+        .map(|p| *p * (HALF / p.abs().max_element()))
+        .collect();
+    // The block's own corners, where no corner of the hole points at them.
+    let mut ring: Vec<(DVec2, usize)> = border.drain(..).zip(0..).collect();
+    for corner in [
+        DVec2::new(1.0, 1.0),
+        DVec2::new(-1.0, 1.0),
+        DVec2::splat(-1.0),
+        DVec2::new(1.0, -1.0),
+    ] {
+        let corner = corner * HALF;
+        if ring.iter().all(|(p, _)| p.distance(corner) > 1e-6) {
+            let angle = |p: DVec2| p.to_angle().rem_euclid(TAU);
+            let before = (ring.iter())
+                .filter(|(p, _)| angle(*p) < angle(corner))
+                .max_by(|a, b| angle(a.0).total_cmp(&angle(b.0)))
+                .or_else(|| ring.iter().max_by(|a, b| angle(a.0).total_cmp(&angle(b.0))));
+            let Some(&(place, hole)) = before else { continue };
+            let index = ring.iter().position(|(p, _)| *p == place).unwrap_or_default();
+            ring.insert(index + 1, (corner, hole));
+        }
+    }
+    let around = ring.len();
+    let mut all: Vec<DVec3> = corners.iter().map(|p| p.extend(0.0)).collect();
+    all.extend(corners.iter().map(|p| p.extend(-DEPTH)));
+    all.extend(ring.iter().map(|(p, _)| p.extend(0.0)));
+    all.extend(ring.iter().map(|(p, _)| p.extend(-HEIGHT)));
+    let (foot, rim, base) = (count, 2 * count, 2 * count + around);
+    let mut loops: Vec<Vec<usize>> = vec![
+        (foot..foot + count).collect(),
+        (base..base + around).rev().collect(),
+    ];
+    for i in 0..count {
+        let next = (i + 1) % count;
+        // The hole's wall faces the axis.
+        loops.push(vec![i, next, foot + next, foot + i]);
+    }
+    for k in 0..around {
+        let next = (k + 1) % around;
+        let (here, there) = (ring[k].1, ring[next].1);
+        let mut top = vec![rim + k, rim + next, there];
+        if here != there {
+            top.push(here);
+        }
+        loops.push(top);
+        loops.push(vec![base + k, base + next, rim + next, rim + k]);
+    }
+    text.polyhedron(&all, &loops)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The block's volume and the peg's agree with the section's area, by the CAD kernel.
+    #[test]
+    fn holes_have_the_area_of_their_pegs() {
+        for section in Section::ALL {
+            let corners = section.corners();
+            let twice: f64 = (0..corners.len())
+                .map(|i| corners[i].perp_dot(corners[(i + 1) % corners.len()]))
+                .sum();
+            let area = twice / 2.0;
+            let [block, peg] = section.shapes().expect("read");
+            assert!(block.closed && peg.closed, "{section:?}");
+            let whole = 4.0 * HALF * HALF * HEIGHT;
+            assert!(
+                (peg.volume_mm3 - area * LENGTH).abs() < 1e-6 * whole,
+                "{section:?}"
+            );
+            assert!(
+                (block.volume_mm3 - (whole - area * DEPTH)).abs() < 1e-6 * whole,
+                "{section:?}"
+            );
+        }
+    }
+}
