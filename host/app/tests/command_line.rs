@@ -146,8 +146,7 @@ fn a_board_gets_the_parts_where_they_are_put_and_only_while_its_motors_are_off()
     let intent = Intent::Instruct("insert the peg".to_owned());
     let why = obstacle(&harness.state().session, &intent).expect("refused");
     assert!(why.contains("disarm"), "{why}");
-    write(&mut harness, "remove the peg");
-    press(&mut harness, Key::Enter);
+    harness.state_mut().session.act(intent);
     harness.run_steps(5);
     assert_eq!(poses(&harness), inserted);
     assert!(harness.state().session.instructions.under_way().is_none());

@@ -197,7 +197,12 @@ pub const ARTEFACTS: &[Artefact] = &[
         name: "energy",
         made: Made::Sweep { quick: false },
         sources: &[
-            &["host/bake/src", "host/brep/src", "host/energy/src", "host/lab/src/energy"],
+            &[
+                "host/bake/src",
+                "host/brep/src",
+                "host/energy/src",
+                "host/lab/src/energy",
+            ],
             CHART,
         ],
     },
