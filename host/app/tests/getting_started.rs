@@ -189,7 +189,7 @@ enum Run {
 
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 
-const COMMANDS: [(&str, Run); 28] = [
+const COMMANDS: [(&str, Run); 32] = [
     ("cargo xtask setup", Run::Elsewhere("CI, before anything else")),
     ("cargo xtask demo", Run::Elsewhere("the step `window` plays it")),
     (
@@ -290,6 +290,22 @@ const COMMANDS: [(&str, Run); 28] = [
         Run::Elsewhere("the step of this name"),
     ),
     ("cargo xtask firmware", Run::Elsewhere("the step `firmware`")),
+    (
+        "mortise task",
+        Run::Here(
+            &["task", SAMPLE, "insert the peg into the block", "--json"],
+            "\"outcome\"",
+        ),
+    ),
+    ("cargo xtask package", Run::Elsewhere("the step `package`")),
+    (
+        "cargo install --path host/app",
+        Run::Elsewhere("builds the program once more"),
+    ),
+    (
+        "mortise manual ~/.local",
+        Run::Here(&["manual", "MANUAL"], "share/man/man1"),
+    ),
 ];
 
 /// The page's separate block; it is run with the rig that is always available.
@@ -345,6 +361,7 @@ fn every_command_of_the_page_is_run_or_has_its_place() {
     let poses: PathBuf = folder.path().join("poses.csv");
     std::fs::write(&poses, "name,x,y,z,qw,qx,qy,qz\nas drawn,0,0,20,1,0,0,0\n").expect("written");
     let out = folder.path().join("pair.image");
+    let manual = folder.path().join("local");
     let headless = Run::Here(
         &["demo", "--headless", "--rig", "sim", "--json"],
         "\"state_hash\"",
@@ -364,6 +381,7 @@ fn every_command_of_the_page_is_run_or_has_its_place() {
         let arguments = arguments.iter().map(|argument| match *argument {
             "OUT" => out.as_os_str(),
             "POSES" => poses.as_os_str(),
+            "MANUAL" => manual.as_os_str(),
             other => other.as_ref(),
         });
         let output = Command::new(env!("CARGO_BIN_EXE_mortise"))

@@ -32,13 +32,21 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             ui.add_space(2.0);
             hand(ui, session, wanted);
             control::divider(ui);
-            fits::show(ui, session, wanted);
+            // With a board, what it guides by comes first.
+            let (first, second): (Section, Section) = match session.connection() {
+                Some(_) => (guidance::show, fits::show),
+                None => (fits::show, guidance::show),
+            };
+            first(ui, session, wanted);
             control::divider(ui);
-            guidance::show(ui, session, wanted);
+            second(ui, session, wanted);
             control::divider(ui);
             parameters::show(ui, session, wanted);
         });
 }
+
+/// A section of the panel.
+type Section = fn(&mut Ui, &Session, &mut Vec<Intent>);
 
 fn label_of(session: &Session, spec: &RigSpec) -> String {
     let entry = session.rigs.iter().find(|entry| entry.spec == *spec);

@@ -21,7 +21,7 @@ use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::experiment::{Experiment, Findings, Form, Report};
 
 /// Steps of the lattices, mm: in full and in the quick form; and how far they extend beyond the solids.
-const STEPS_MM: [f64; 2] = [1.0, 2.0];
+const STEPS_MM: [f64; 2] = [1.5, 2.5];
 const MARGIN_MM: f64 = 8.0;
 /// Turn of the peg's lattice, degrees, about an axis that is none of the solids'.
 const TURN_DEG: f64 = 17.0;
@@ -56,8 +56,12 @@ pub struct Entry {
     pub basin_mm: f64,
     /// The same of tilts, degrees.
     pub basin_deg: f64,
-    /// Lateral energy 1, 2 and 5 mm above the mouth at an offset of 3 mm less that on the axis, over the well's depth: negative pushes aside.
-    pub above: [f64; 3],
+    /// Energy 3 mm aside of the axis less that on it, over the well's depth, with the foot 1 mm above the mouth: negative pushes aside.
+    pub above_1_mm: f64,
+    /// The same 2 mm above the mouth.
+    pub above_2_mm: f64,
+    /// The same 5 mm above the mouth.
+    pub above_5_mm: f64,
 }
 
 impl fmt::Display for Entry {
@@ -72,9 +76,9 @@ impl fmt::Display for Entry {
             self.tilt_bias_mrad,
             self.basin_mm,
             self.basin_deg,
-            self.above[0],
-            self.above[1],
-            self.above[2],
+            self.above_1_mm,
+            self.above_2_mm,
+            self.above_5_mm,
         )
     }
 }
@@ -115,7 +119,7 @@ impl Measured {
         };
         let tilt =
             [DVec3::X, DVec3::Y].map(|axis| least_at(&|angle| tilted(axis, angle), SEARCH_DEG.to_radians()));
-        let above = ABOVE_MM.map(|height| {
+        let [above_1_mm, above_2_mm, above_5_mm] = ABOVE_MM.map(|height| {
             let at = |by: f64| self.at(DVec3::new(by, 0.0, height), DVec3::ZERO);
             at(0.5 * ASIDE_MM) - at(0.0)
         });
@@ -132,7 +136,9 @@ impl Measured {
                 ANGLE_DEG.to_radians(),
             )
             .to_degrees(),
-            above,
+            above_1_mm,
+            above_2_mm,
+            above_5_mm,
         }
     }
 }
@@ -191,8 +197,9 @@ fn chart(title: String, x: &str, series: Vec<Series>) -> Chart {
     Chart {
         title,
         note: String::new(),
+        // The depth is that of the well at the fit.
         x: Axis::new(x).linear(),
-        y: Axis::new("energy over the well's depth").linear(),
+        y: Axis::new("energy / depth").linear(),
         series,
     }
 }
@@ -296,7 +303,7 @@ impl Experiment for Energy {
     }
 
     fn quick(&self) -> &'static str {
-        "a lattice of 2 mm"
+        "a lattice of 2.5 mm"
     }
 
     fn rows(&self) -> Vec<String> {
