@@ -89,9 +89,14 @@ fn belongs_to_system(name: &str) -> bool {
 
 /// The package that a library is from, and the file with its licence.
 fn notice(library: &Path) -> Option<(String, PathBuf)> {
-    // Files are listed by their names without links.
+    // By the file's name, because systems differ in which of two linked folders the list of files has.
     let real = library.canonicalize().ok()?;
-    let said = shell::read(Command::new("dpkg").arg("-S").arg(real)).ok()?;
+    let list = Command::new("dpkg")
+        .arg("-S")
+        .arg(real.file_name()?)
+        .output()
+        .ok()?;
+    let said = String::from_utf8_lossy(&list.stdout);
     let package = said.split(':').next()?.trim().to_owned();
     let file = Path::new("/usr/share/doc").join(&package).join("copyright");
     file.is_file().then_some((package, file))
