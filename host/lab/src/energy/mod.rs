@@ -1,6 +1,6 @@
 //! The geometric energy of a peg and its hole (Behandish & Ilieş 2015) in six degrees of freedom: figs. 5 and 6 repeated, and where the minimum is.
 //!
-//! Three sections at exact fit ([`sections`]), the kernel's weights as in the paper (λ₂/λ₁ = 3), σ = 0.2. The peg's lattice is turned by 17° so that no
+//! Three sections at exact fit (`sections`), the kernel's weights as in the paper (λ₂/λ₁ = 3), σ = 0.2. The peg's lattice is turned by 17° so that no
 //! symmetry hides an error. Energies are given as shares of the well's depth at the fit.
 //!
 //! Measured besides: how far the minimum is off the fit, seated and half in, with all samples and with the strongest alone, as a board could take; how wide
