@@ -2,11 +2,10 @@
 
 mod common;
 
-use common::{arm, click, connect, harness, open_sample, until};
+use common::{arm, click, connect, harness, open_sample, poses, press, until};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use glam::DAffine3;
 use mortise::session::document::Document;
 use mortise::session::{Intent, obstacle};
 use mortise::ui::Window;
@@ -14,15 +13,6 @@ use mortise_words::Outcome;
 
 fn document<'a>(harness: &'a Harness<'_, Window>) -> &'a Document {
     harness.state().session.document.as_ref().expect("open")
-}
-
-fn poses(harness: &Harness<'_, Window>) -> Vec<DAffine3> {
-    document(harness).poses.clone()
-}
-
-fn press(harness: &mut Harness<'_, Window>, key: Key) {
-    harness.key_press(key);
-    harness.run_steps(2);
 }
 
 /// Types into the command line.

@@ -2,32 +2,19 @@
 
 mod common;
 
-use common::{arm, click, connect, harness, holding, open_sample, until};
+use common::{arm, click, connect, harness, holding, open_sample, picture, poses, press, until};
 use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::{DAffine3, DVec3};
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
-use mortise::viewport::compose::{Look, compose};
 use mortise::viewport::picture::Item;
 use mortise_protocol::message::DeviceState;
 
-fn poses(harness: &Harness<'_, Window>) -> Vec<DAffine3> {
-    let document = harness.state().session.document.as_ref();
-    document.expect("open").poses.clone()
-}
-
 /// What is drawn beside the parts.
 fn ghosts(harness: &Harness<'_, Window>) -> Vec<Item> {
-    let window = harness.state();
-    let document = window.session.document.as_ref().expect("open");
-    let look = Look {
-        camera: window.view.camera,
-        ..Look::default()
-    };
-    let picture = compose(&window.session, document, &look);
-    picture.items.into_iter().skip(document.poses.len()).collect()
+    picture(harness).split_off(poses(harness).len())
 }
 
 /// Where the fit that is shown puts the part.
@@ -44,11 +31,6 @@ fn chosen(harness: &Harness<'_, Window>) -> usize {
 
 fn searched(session: &Session) -> bool {
     (session.fitting.as_ref()).is_some_and(|fitting| fitting.search.is_none() && !fitting.offers.is_empty())
-}
-
-fn press(harness: &mut Harness<'_, Window>, key: Key) {
-    harness.key_press(key);
-    harness.run_steps(2);
 }
 
 /// The peg selected and its fits found.

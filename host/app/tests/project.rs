@@ -352,14 +352,20 @@ fn save_as(harness: &mut Harness<'_, Window>, path: &Path) {
     });
 }
 
-#[test]
-fn a_project_file_opens_its_model_also_where_both_were_moved() {
+/// A window in which the project of a changed model was just written to a file.
+fn written() -> (tempfile::TempDir, Harness<'static, Window>, PathBuf) {
     let place = tempfile::tempdir().expect("folder");
     model(place.path());
     let mut harness = opened(place.path());
     change(&mut harness.state_mut().session);
     let file = place.path().join("mine.mortise");
     save_as(&mut harness, &file);
+    (place, harness, file)
+}
+
+#[test]
+fn a_project_file_opens_its_model_also_where_both_were_moved() {
+    let (place, harness, _) = written();
     drop(harness);
     let elsewhere = tempfile::tempdir().expect("folder");
     for name in ["mine.mortise", "assembly.step"] {
@@ -376,12 +382,7 @@ fn a_project_file_opens_its_model_also_where_both_were_moved() {
 /// A project whose parts are partly gone, of a model that has changed: what there is comes back, the rest is named.
 #[test]
 fn parts_that_are_gone_are_named() {
-    let place = tempfile::tempdir().expect("folder");
-    model(place.path());
-    let mut harness = opened(place.path());
-    change(&mut harness.state_mut().session);
-    let file = place.path().join("mine.mortise");
-    save_as(&mut harness, &file);
+    let (_place, mut harness, file) = written();
     let mut project = Project::from_json(&std::fs::read(&file).expect("there")).expect("sound");
     let pose = DAffine3::from_rotation_translation(DQuat::from_rotation_x(0.3), DVec3::X);
     project.parts.push(KeptPart {

@@ -2,13 +2,12 @@
 
 mod common;
 
-use common::{click, harness, holding, open_sample};
+use common::{click, harness, holding, open_sample, picture};
 use egui::{Key, Modifiers, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
 use mortise::ui::Window;
-use mortise::viewport::compose::{Look, compose};
 use mortise::viewport::gesture::on_screen;
 
 fn sample() -> Harness<'static, Window> {
@@ -25,14 +24,7 @@ fn hidden(harness: &Harness<'_, Window>) -> Vec<bool> {
 
 /// Shapes of the parts that are drawn.
 fn drawn(harness: &Harness<'_, Window>) -> Vec<usize> {
-    let window = harness.state();
-    let document = window.session.document.as_ref().expect("open");
-    let look = Look {
-        camera: window.view.camera,
-        ..Look::default()
-    };
-    let picture = compose(&window.session, document, &look);
-    picture.items.iter().map(|item| item.shape).collect()
+    picture(harness).iter().map(|item| item.shape).collect()
 }
 
 fn press(harness: &mut Harness<'_, Window>, modifiers: Modifiers, key: Key) {

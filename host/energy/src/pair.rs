@@ -66,8 +66,9 @@ impl Pair {
     /// The same with the strongest samples alone, each as it is: what a board has time for.
     pub fn strongest(&self, count: usize) -> Self {
         Self {
+            fixed: self.fixed.clone(),
             samples: self.samples.iter().take(count).copied().collect(),
-            ..self.clone()
+            scale: self.scale,
         }
     }
 

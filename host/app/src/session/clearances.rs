@@ -30,14 +30,19 @@ impl Near {
 
     /// The gap or overlap in words.
     pub fn words(&self) -> String {
-        let um = 1e3 * self.distance_mm;
-        if self.clashes() {
-            format!("overlap {:.1} µm", -um)
-        } else if self.distance_mm <= TOUCH_MM {
-            "touching".to_owned()
-        } else {
-            format!("gap {um:.1} µm")
-        }
+        words(self.distance_mm)
+    }
+}
+
+/// A signed distance of two parts in words.
+pub fn words(distance_mm: f64) -> String {
+    let um = 1e3 * distance_mm;
+    if distance_mm < -TOUCH_MM {
+        format!("overlap {:.1} µm", -um)
+    } else if distance_mm <= TOUCH_MM {
+        "touching".to_owned()
+    } else {
+        format!("gap {um:.1} µm")
     }
 }
 

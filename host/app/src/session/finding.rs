@@ -118,19 +118,9 @@ impl Session {
 
     /// Why the part cannot be put into the fit that is shown, as a sentence.
     pub(super) fn no_placing(&self) -> Option<String> {
-        let no = |reason: &str| Some(reason.to_owned());
-        if self.fitting.as_ref().and_then(Fitting::offer).is_none() {
-            return no(NO_FIT);
-        }
-        if self.is_armed() {
-            return no("Only while the motors are off: disarm first");
-        }
-        match self.connection() {
-            Some(connection) if connection.upload.is_some() => {
-                no("Wait until the collision model is on the board")
-            }
-            _ => None,
-        }
+        let is_shown = self.fitting.as_ref().and_then(Fitting::offer).is_some();
+        let reason = if is_shown { self.no_move() } else { Some(NO_FIT) };
+        reason.map(str::to_owned)
     }
 
     /// Puts the part into the fit that is shown.

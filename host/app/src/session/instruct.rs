@@ -71,10 +71,6 @@ impl Session {
             Ok(said) => said,
             Err(why) => return refused(&why),
         };
-        let (armed, uploading) = (
-            self.is_armed(),
-            self.connection().is_some_and(|c| c.upload.is_some()),
-        );
         let Some(document) = &self.document else {
             return refused("no file is open");
         };
@@ -84,13 +80,10 @@ impl Session {
                     "the parts were moved meanwhile, so nothing was done; give the instruction again",
                 );
             }
-            if armed || uploading {
-                return refused(match armed {
-                    true => "the motors were switched on meanwhile, so nothing was done; disarm first",
-                    false => {
-                        "the collision model is being uploaded, so nothing was done; give the instruction again"
-                    }
-                });
+            if let Some(why) = self.no_move() {
+                return refused(&format!(
+                    "nothing was done. {why}, and give the instruction again"
+                ));
             }
             // A board gets the scene with the parts here.
             self.place(poses);

@@ -32,7 +32,7 @@ pub(super) struct Talk {
 
 /// The end of an instruction.
 pub(super) struct Said {
-    /// Where the parts then are; `None`: nothing can be instructed, for a reason.
+    /// The talk, what became of the instruction, and where the parts then are; or why the assembly takes no instructions.
     pub turn: Result<(Box<Talk>, Turn, Vec<DAffine3>), String>,
 }
 

@@ -437,12 +437,8 @@ fn instruct(session: &Session, text: &str) -> Option<String> {
         "Write an instruction first"
     } else if session.instructions.under_way().is_some() {
         "An instruction is under way"
-    } else if session.is_armed() {
-        "Only while the motors are off: disarm first"
-    } else if session.connection().is_some_and(|c| c.upload.is_some()) {
-        "The collision model is being uploaded"
     } else {
-        return None;
+        session.no_move()?
     };
     Some(reason.to_owned())
 }

@@ -6,6 +6,16 @@ use mortise_protocol::message::ToDevice;
 use super::state::Session;
 
 impl Session {
+    /// Why no part can be put elsewhere now, as a sentence.
+    pub(super) fn no_move(&self) -> Option<&'static str> {
+        if self.is_armed() {
+            Some("Only while the motors are off: disarm first")
+        } else {
+            let uploads = self.connection().is_some_and(|c| c.upload.is_some());
+            uploads.then_some("Wait until the collision model is on the board")
+        }
+    }
+
     /// Puts every part of the document at a pose, mm. A board gets the scene anew, with its parts there; its motors must be off.
     pub(super) fn place(&mut self, poses: Vec<DAffine3>) {
         let Some(document) = &mut self.document else {

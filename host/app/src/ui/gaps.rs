@@ -6,6 +6,7 @@ use mortise_inspect::TOUCH_MM;
 
 use super::{control, theme};
 use crate::cut::{Band, Cut, Gaps};
+use crate::session::clearances;
 use crate::session::document::Document;
 use crate::viewport::gesture::{Viewpoint, on_screen};
 
@@ -145,14 +146,7 @@ fn words(document: &Document, band: &Band, share: f64) -> String {
     let [a, b] = band.distances_mm;
     let mm = a + share * (b - a);
     let [own, other] = band.parts.map(|part| document.part_name(part));
-    let what = if mm < -TOUCH_MM {
-        format!("overlap {:.1} µm", -1e3 * mm)
-    } else if mm <= TOUCH_MM {
-        "touching".to_owned()
-    } else {
-        format!("gap {:.1} µm", 1e3 * mm)
-    };
-    format!("{own} – {other}: {what}")
+    format!("{own} – {other}: {}", clearances::words(mm))
 }
 
 /// A text beside the pointer.

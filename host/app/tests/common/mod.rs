@@ -6,12 +6,16 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use glam::DAffine3;
 use mortise::kept::StateFolder;
 use mortise::session::Session;
 use mortise::session::notes::Severity;
 use mortise::ui::{Window, theme};
+use mortise::viewport::compose::{Look, compose};
+use mortise::viewport::picture::Item;
 use mortise_protocol::message::DeviceState;
 use mortise_rig::RigSpec;
 
@@ -66,6 +70,29 @@ pub fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Sessi
         }
         std::thread::sleep(Duration::from_millis(10));
     }
+}
+
+/// Present poses of the parts, mm.
+pub fn poses(harness: &Harness<'_, Window>) -> Vec<DAffine3> {
+    let document = harness.state().session.document.as_ref();
+    document.expect("open").poses.clone()
+}
+
+/// What is drawn: the parts, then what is beside them.
+pub fn picture(harness: &Harness<'_, Window>) -> Vec<Item> {
+    let window = harness.state();
+    let document = window.session.document.as_ref().expect("open");
+    let look = Look {
+        camera: window.view.camera,
+        ..Look::default()
+    };
+    compose(&window.session, document, &look).items
+}
+
+/// Presses a key.
+pub fn press(harness: &mut Harness<'_, Window>, key: Key) {
+    harness.key_press(key);
+    harness.run_steps(2);
 }
 
 /// Clicks the control with this accessible name.

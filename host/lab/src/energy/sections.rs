@@ -98,12 +98,9 @@ fn prism(text: &mut StepText, corners: &[DVec2]) -> u64 {
 /// The top is divided from each corner of the hole to the place on the block's border in the same direction.
 fn block(text: &mut StepText, corners: &[DVec2]) -> u64 {
     let count = corners.len();
-    let mut border: Vec<DVec2> = corners
-        .iter()
-        .map(|p| *p * (HALF / p.abs().max_element()))
-        .collect();
-    // The block's own corners, where no corner of the hole points at them.
-    let mut ring: Vec<(DVec2, usize)> = border.drain(..).zip(0..).collect();
+    let border = corners.iter().map(|p| *p * (HALF / p.abs().max_element()));
+    // Each place with the corner of the hole it is joined to; then the block's own corners, where no corner of the hole points at them.
+    let mut ring: Vec<(DVec2, usize)> = border.zip(0..).collect();
     for corner in [
         DVec2::new(1.0, 1.0),
         DVec2::new(-1.0, 1.0),
