@@ -51,9 +51,12 @@ fn make(root: &Path, program: &Path) -> Result<Vec<PathBuf>> {
     tree::lay_out(root, program, &bundle)?;
     libraries::bring_along(&bundle)?;
     let archive = archive::pack(&place, &about)?;
+    std::fs::remove_dir_all(&bundle)?;
     let staged = place.join("debian");
     tree::lay_out(root, program, &staged.join("usr"))?;
-    Ok(vec![archive, debian::pack(&place, &staged, &about)?])
+    let debian = debian::pack(&place, &staged, &about)?;
+    std::fs::remove_dir_all(&staged)?;
+    Ok(vec![archive, debian])
 }
 
 fn folder(root: &Path) -> Result<PathBuf> {
@@ -86,5 +89,6 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
     if !said.contains("peg") {
         bail!("the archive's program does not read the sample:\n{said}");
     }
+    std::fs::remove_dir_all(&unpacked)?;
     Ok(format!("{} packages", made.len()))
 }
