@@ -87,12 +87,11 @@ parameters! {
     HostTimeout = "s", 0.05, 5.0, 0.5;
     /// Largest work of a tick, in field queries (look-ups); a point that may touch counts 3.
     PointBudget = "look-ups", 16.0, 65_535.0, 520.0;
-    /// Integration of the object's motion: 0 implicit, 1 explicit (the textbook's, which trembles on stiff contact).
+    /// Integration of the object's motion; explicit is the textbook's, which trembles on stiff contact.
     Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];
-    /// Guidance by constraint targets: 0 none, 1 stiff with limited force, 2 the blend of the thesis.
-    Guidance = "choice", 0.0, 2.0, 1.0, ["off", "capped", "thesis"];
-    /// Whether mating faces that an engaged target keeps apart are excluded from contact: 0 no, 1 yes. The forces are the same; for comparing tick
-    /// costs.
+    /// Guidance by constraint targets: none, stiff with limited force, or the softer blend of the thesis.
+    Guidance = "choice", 0.0, 2.0, 1.0, ["off", "force-limited", "Faas 2010"];
+    /// Whether mating faces that an engaged target keeps apart are excluded from contact. The forces are the same; for comparing tick costs.
     Joints = "choice", 0.0, 1.0, 1.0, ["off", "on"];
     /// Distance by which points of the held part are moved inward for voxmap queries; the textbook's pointshell shrinking, for comparison.
     Shrinking = "voxels", 0.0, 1.0, 0.0;

@@ -174,7 +174,7 @@ fn a_recorded_demo_replays() {
     refused(&["replay", file, "--csv", path], "--force");
     refused(&["replay", SAMPLE], "is not a recording");
     refused(&["replay", file, "--set", "Nonsense=1"], "no parameter");
-    refused(&demo, "exists");
+    refused(&demo, "no recording is replaced");
 }
 
 #[test]

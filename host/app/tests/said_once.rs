@@ -100,17 +100,19 @@ fn page() -> String {
 
 /// The page's range and default are compared in `protocol/tests/document.rs`.
 #[test]
-fn the_page_has_the_meaning_of_every_parameter() {
+fn the_page_has_the_meaning_and_choices_of_every_parameter() {
     let page = page();
     for row in PARAMETERS {
         let name = format!("| `{}` |", row.name);
         let line = page.lines().find(|line| line.starts_with(&name)).expect(row.name);
-        let rounded = if row.choices.is_empty() {
-            ""
+        let choices = row.choices.iter().enumerate();
+        let choices: Vec<String> = choices.map(|(value, name)| format!("{value} {name}")).collect();
+        let choices = if choices.is_empty() {
+            String::new()
         } else {
-            "; values are rounded to the nearest"
+            format!(": {}, rounded to the nearest", choices.join(", "))
         };
-        let ends = format!("| {}{rounded} |", row.description.trim().trim_end_matches('.'));
+        let ends = format!("| {}{choices} |", row.description.trim().trim_end_matches('.'));
         assert!(line.ends_with(&ends), "{line} does not end with {ends}");
     }
 }

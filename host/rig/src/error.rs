@@ -20,7 +20,7 @@ pub enum RigError {
         hint: String,
     },
     /// There is no such port.
-    #[error("there is no port {port}; {known}")]
+    #[error("there is no port `{port}`: {known}; a rig is `sim`, `emulated` or the name of a port")]
     NoSuchPort {
         /// Port.
         port: String,

@@ -90,9 +90,9 @@ fn is_busy(error: &serialport::Error) -> bool {
 fn known() -> String {
     let names: Vec<String> = ports().into_iter().map(|port| port.port_name).collect();
     if names.is_empty() {
-        "no serial port is attached: plug the board in, or use `sim` or `emulated`".into()
+        "none is attached, plug the board in".into()
     } else {
-        format!("attached: {}", names.join(", "))
+        format!("attached are {}", names.join(", "))
     }
 }
 

@@ -229,7 +229,9 @@ fn a_port_that_is_not_there_is_named() {
         port: "/dev/ttyNOBODY7".into(),
     };
     let said = error(Client::connect(&spec)).to_string();
-    assert!(said.contains("there is no port /dev/ttyNOBODY7"), "{said}");
+    assert!(said.contains("there is no port `/dev/ttyNOBODY7`"), "{said}");
+    // A mistyped rig is taken for a port: the words for the other rigs are said.
+    assert!(said.contains("`sim`, `emulated`"), "{said}");
 }
 
 #[test]

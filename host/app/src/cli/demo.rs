@@ -50,6 +50,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.record {
         // Before the work begins.
+        if path.exists() {
+            anyhow::bail!(
+                "{}: exists already, and no recording is replaced; give another name",
+                path.display()
+            );
+        }
         Output::new(path, Existing::Keep, args.file.as_slice())?;
     }
     let rig = args.rig.clone().unwrap_or_else(best_rig);

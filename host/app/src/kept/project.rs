@@ -108,8 +108,8 @@ pub struct KeptFit {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
-    /// Parameters of the board, by name.
-    pub parameters: BTreeMap<String, f32>,
+    /// Parameters of the board by name, for each rig on which they were set.
+    pub parameters: BTreeMap<String, BTreeMap<String, f32>>,
     /// When fits start to guide, by name.
     pub engage: Option<String>,
     /// Largest guidance force, N.
@@ -126,7 +126,8 @@ impl Settings {
             self.guide_cap_n.is_some(),
             self.method.is_some(),
         ];
-        self.parameters.len() + others.into_iter().filter(|differs| *differs).count()
+        let parameters: usize = self.parameters.values().map(BTreeMap::len).sum();
+        parameters + others.into_iter().filter(|differs| *differs).count()
     }
 }
 
@@ -258,7 +259,7 @@ mod tests {
                 off: false,
             }],
             settings: Settings {
-                parameters: BTreeMap::from([("ForceLimit".into(), 3.5)]),
+                parameters: BTreeMap::from([("sim".into(), BTreeMap::from([("ForceLimit".into(), 3.5)]))]),
                 engage: Some("near".into()),
                 guide_cap_n: Some(2.0),
                 method: Some(mortise_bake::Method::Occupancy),
@@ -389,6 +390,7 @@ mod tests {
 
     fn settings() -> impl Strategy<Value = Settings> {
         let parameters = prop::collection::btree_map(".{0,12}", -1e6..1e6f32, 0..5);
+        let parameters = prop::collection::btree_map(".{0,12}", parameters, 0..3);
         let engage = prop::option::of(".{0,8}");
         let method = prop::option::of(Just(mortise_bake::Method::Occupancy));
         (parameters, engage, prop::option::of(0.0..9.0f32), method).prop_map(

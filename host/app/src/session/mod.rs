@@ -40,6 +40,7 @@ pub mod threads;
 pub mod touch;
 mod tour;
 pub mod tree;
+mod tuning;
 mod update;
 pub mod verdict;
 mod visibility;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use mortise_bake::{BakeOptions, Method, Request};
 use mortise_guide::List;
 use mortise_protocol::message::{DeviceState, HandScript, ToDevice};
-use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_protocol::parameter::PARAMETERS;
 use mortise_rig::{EmulatedMode, RigSpec};
 
 use super::fitting::Fitting;
@@ -275,46 +275,6 @@ impl Session {
             self.request(ToDevice::Release);
         }
         self.request(ToDevice::Grab { part: scene_part });
-    }
-
-    pub(super) fn set_parameter(&mut self, id: ParameterId, value: f32) {
-        let row = id.row();
-        let value = if value.is_finite() {
-            value.clamp(row.min, row.max)
-        } else {
-            row.default
-        };
-        if let Some(known) = self.parameters.get_mut(id as usize) {
-            *known = value;
-        }
-        self.own_parameters.insert(id as usize, value);
-        if let Some(connection) = self.connection_mut() {
-            connection.set_parameter(id, value);
-        }
-        if id == ParameterId::Guidance {
-            self.guide.sending = self.guides();
-            self.command_guidance(GuidanceCommand::Set(self.guide));
-        }
-    }
-
-    /// Sends the parameters that the user has set to a board that has others, and says which.
-    pub(super) fn send_own_parameters(&mut self) {
-        let differs = |id: ParameterId| {
-            let own = self.own_parameters.get(&(id as usize)).copied();
-            own.filter(|own| self.parameters[id as usize] != *own)
-        };
-        let sent: Vec<(&str, ParameterId, f32)> = (PARAMETERS.iter())
-            .filter_map(|row| Some((row.name, row.id, differs(row.id)?)))
-            .collect();
-        if sent.is_empty() {
-            return;
-        }
-        let names: Vec<&str> = sent.iter().map(|(name, ..)| *name).collect();
-        let text = format!("Set on the board as before: {}", names.join(", "));
-        self.notes.add(Severity::Info, text);
-        for (_, id, value) in sent {
-            self.set_parameter(id, value);
-        }
     }
 
     fn demo(&mut self, rig: Option<RigSpec>) {

@@ -12,7 +12,7 @@ use super::document::Document;
 use super::fits::FitChoice;
 use super::link::Link;
 use super::notes::Severity;
-use super::state::{GUIDE_CAP_N, Looks, Session};
+use super::state::{GUIDE_CAP_N, Looks, OwnParameters, Session};
 use crate::kept::project::{KeptFit, KeptPart, ModelFile, Placement, Project, Settings, VERSION, absolute};
 
 /// Most names that a message lists.
@@ -69,13 +69,18 @@ pub fn capture(session: &Session, document: &Document) -> Project {
 }
 
 fn settings(session: &Session) -> Settings {
-    let changed = PARAMETERS.iter().filter_map(|row| {
-        let value = *session.own_parameters.get(&(row.id as usize))?;
-        (value != row.default && value.is_finite()).then(|| (row.name.to_owned(), value))
-    });
+    let changed = |own: &OwnParameters| -> BTreeMap<String, f32> {
+        let changed = PARAMETERS.iter().filter_map(|row| {
+            let value = *own.get(&(row.id as usize))?;
+            (value != row.default && value.is_finite()).then(|| (row.name.to_owned(), value))
+        });
+        changed.collect()
+    };
+    let rigs = session.own_parameters.iter();
+    let parameters = rigs.map(|(rig, own)| (rig.clone(), changed(own)));
     let (guide, usual) = (&session.guide, mortise_guide::GuideSettings::default());
     Settings {
-        parameters: changed.collect(),
+        parameters: parameters.filter(|(_, changed)| !changed.is_empty()).collect(),
         engage: (guide.when != usual.when).then(|| name(guide.when).to_owned()),
         guide_cap_n: (guide.force_cap_n != usual.force_cap_n).then_some(guide.force_cap_n),
         method: (session.method != mortise_bake::Method::default()).then_some(session.method),
@@ -159,14 +164,30 @@ fn apply_settings(session: &mut Session, project: &Project) {
         guide_cap_n,
         method,
     } = &project.settings;
+    // A connection that exists or is being made was chosen by the user since.
+    let rig = project.rig.as_ref().and_then(|rig| rig.parse().ok());
+    if let (Link::None, None, Some(rig)) = (&session.link, &session.tour, rig) {
+        session.chosen = rig;
+    }
+    let known = |kept: &BTreeMap<String, f32>| -> OwnParameters {
+        let known = PARAMETERS.iter().filter_map(|row| {
+            let value = kept.get(row.name).copied().filter(|value| value.is_finite())?;
+            Some((row.id as usize, value))
+        });
+        known.collect()
+    };
+    let kept = parameters.iter().map(|(rig, kept)| (rig.clone(), known(kept)));
+    let before = std::mem::replace(&mut session.own_parameters, kept.collect());
+    let of_this_rig = |rigs: &BTreeMap<String, OwnParameters>| {
+        rigs.get(&session.rig_of_parameters())
+            .cloned()
+            .unwrap_or_default()
+    };
+    let (before, kept) = (of_this_rig(&before), of_this_rig(&session.own_parameters));
     for row in PARAMETERS {
-        let kept = parameters
-            .get(row.name)
-            .copied()
-            .filter(|value| value.is_finite());
-        let own = session.own_parameters.contains_key(&(row.id as usize));
-        if own || kept.is_some() {
-            session.set_parameter(row.id, kept.unwrap_or(row.default));
+        let value = kept.get(&(row.id as usize));
+        if value.is_some() || before.contains_key(&(row.id as usize)) {
+            session.set_parameter(row.id, value.copied().unwrap_or(row.default));
         }
     }
     let usual = mortise_guide::GuideSettings::default();
@@ -177,11 +198,6 @@ fn apply_settings(session: &mut Session, project: &Project) {
         .unwrap_or(usual.force_cap_n);
     session.guide.force_cap_n = cap.clamp(*GUIDE_CAP_N.start(), *GUIDE_CAP_N.end());
     session.method = method.unwrap_or_default();
-    // A connection that exists or is being made was chosen by the user since.
-    let rig = project.rig.as_ref().and_then(|rig| rig.parse().ok());
-    if let (Link::None, None, Some(rig)) = (&session.link, &session.tour, rig) {
-        session.chosen = rig;
-    }
 }
 
 fn report(

@@ -71,6 +71,9 @@ pub struct Lost {
     pub why: String,
 }
 
+/// Parameters that the user has set on a rig, by their place in [`PARAMETERS`].
+pub type OwnParameters = BTreeMap<usize, f32>;
+
 /// Everything the window shows.
 pub struct Session {
     /// The open document.
@@ -127,8 +130,8 @@ pub struct Session {
     pub looks: Option<Looks>,
     /// The user's choices of fits.
     pub fits: BTreeMap<TargetId, FitChoice>,
-    /// Parameters that the user has set, by their place in [`PARAMETERS`]: every board gets them.
-    pub(super) own_parameters: BTreeMap<usize, f32>,
+    /// Parameters that the user has set, for each rig ([`Self::rig_of_parameters`]): a board gets those that were set on it.
+    pub(super) own_parameters: BTreeMap<String, OwnParameters>,
     /// Instructions in plain words.
     pub instructions: Instructions,
     pub(super) keeper: Keeper,

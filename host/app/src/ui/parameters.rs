@@ -94,11 +94,10 @@ pub fn one(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Param
 pub fn choice(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
     let known = session.parameters[row.id as usize].round() as usize;
     let reason = obstacle(session, &Intent::SetParameter(row.id, row.default));
-    let names: Vec<&str> = row.choices.iter().map(|&name| label(name)).collect();
     if let Some(chosen) = combo(
         ui,
         &words(row.name),
-        &names,
+        row.choices,
         known,
         row.description.trim(),
         reason,
@@ -133,15 +132,6 @@ pub fn combo(
     .response
     .on_hover_text(hint);
     (chosen != known).then_some(chosen)
-}
-
-/// Label of a choice in the window, for the parameter table's `name`.
-fn label(name: &str) -> &str {
-    match name {
-        "capped" => "force-limited",
-        "thesis" => "Faas 2010",
-        other => other,
-    }
 }
 
 fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
@@ -322,7 +312,7 @@ mod tests {
         let session = connected();
         for row in PARAMETERS.iter().filter(|row| !row.choices.is_empty()) {
             let found = texts(&session, row);
-            let chosen = label(row.choice(row.default).expect("a choice"));
+            let chosen = row.choice(row.default).expect("a choice");
             assert!(
                 found.iter().any(|text| text == chosen),
                 "{chosen} is not in {found:?}"
