@@ -5,9 +5,12 @@ use std::sync::{Arc, OnceLock};
 use glam::{DAffine3, DVec3};
 use mortise_brep::CadModel;
 use mortise_mating::{Contact, MergedSurface, Tolerances, identify, merge};
+use rayon::prelude::*;
 
 use crate::body::Body;
-use crate::clearance::{Gap, Limits, Placed, each_near, free_share, gap, gap_until, least_over, refined};
+use crate::clearance::{
+    Gap, Limits, Placed, each_near, free_share, free_share_by_cores, gap, gap_until, least_over, refined,
+};
 use crate::error::TaskError;
 use crate::motion::Motion;
 use crate::skeleton::{Skeleton, skeleton};
@@ -346,6 +349,37 @@ impl Assembly {
         step_mm: f64,
     ) -> (f64, Option<[usize; 2]>) {
         self.free_share_beyond(group, others, motion, step_mm, 0.0, false)
+    }
+
+    /// As [`Self::free_share`], by all cores: for a motion that is expected to be free, one at a time. Of a motion that meets several of `others` the first pair
+    /// is stated.
+    pub fn free_share_by_cores(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        motion: &Motion,
+        step_mm: f64,
+    ) -> (f64, Option<[usize; 2]>) {
+        let pairs = group
+            .parts
+            .iter()
+            .flat_map(|&a| others.iter().map(move |&b| [a, b]));
+        let pairs: Vec<[usize; 2]> = pairs.collect();
+        let share = |&[a, b]: &[usize; 2]| {
+            let limits = Limits {
+                allow_mm: self.allowed_mm(a, b),
+                step_mm,
+                coarse: false,
+            };
+            let (a, b) = (self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY));
+            free_share_by_cores(a, b, motion, &limits)
+        };
+        let shares: Vec<f64> = pairs.par_iter().with_max_len(1).map(share).collect();
+        let first = shares.iter().zip(&pairs).min_by(|(s, _), (t, _)| s.total_cmp(t));
+        match first {
+            Some((&share, &pair)) if share < 1.0 => (share, Some(pair)),
+            _ => (1.0, None),
+        }
     }
 
     /// As [`Self::free_share`], up to where the distance falls below `margin` mm beyond what is allowed; `coarse`: by few samples.

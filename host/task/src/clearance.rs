@@ -9,6 +9,7 @@
 //! they slide, where the bounds end at [`Limits::step_mm`]: there a sample is checked once a step.
 
 use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 
 use crate::body::Body;
 use crate::motion::Motion;
@@ -231,6 +232,33 @@ pub fn free_share(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits
     }
     let sweep = Sweep { a, b, motion, limits };
     sweep.stretch(&items, 0.0, 1.0, 0).unwrap_or(1.0)
+}
+
+/// Least number of pieces of a body's tree that are swept side by side: most of the work may be in few of them.
+const PIECES: usize = 64;
+
+/// As [`free_share`], to the same bits, by all cores. No piece ends early because another one meets something: for motions that are expected to be free,
+/// one at a time.
+pub fn free_share_by_cores(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits) -> f64 {
+    let mut pieces = Vec::new();
+    for way in WAYS {
+        let nodes = sides(way, a, b).of.nodes(limits.coarse);
+        let mut level: Vec<u32> = (0..nodes.len().min(1) as u32).collect();
+        while level.len() < PIECES && level.iter().any(|&i| !nodes[i as usize].is_leaf()) {
+            let halves = level.iter().flat_map(|&i| match nodes[i as usize] {
+                node if node.is_leaf() => vec![i],
+                node => vec![node.first, node.second],
+            });
+            level = halves.collect();
+        }
+        pieces.extend(level.into_iter().map(|i| (way, i)));
+    }
+    let sweep = Sweep { a, b, motion, limits };
+    // The first stretch that a piece finds is the earliest of it, and the earliest of all pieces is that of the whole tree.
+    let met = pieces
+        .par_iter()
+        .filter_map(|&piece| sweep.stretch(&[piece], 0.0, 1.0, 0));
+    met.reduce(|| 1.0, f64::min)
 }
 
 /// Least distance of the bodies over a motion of the first where it is below `within` mm, and the share of the motion at which it is reached; `None` where it

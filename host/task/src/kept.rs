@@ -85,16 +85,19 @@ impl Kept {
 
     /// What is known of the surroundings of `p`; `None` outside. `level`: 0 of its block, 1 of its cell, 2 of its part of a cell that has no face alone.
     pub fn of(&self, surface: &ExactSurface, p: DVec3, level: u8) -> Option<Known> {
-        let at = ((p - self.origin) / self.cell_mm).floor();
-        let inside = |i: usize| at[i] >= 0.0 && at[i] < self.counts[i] as f64;
+        let cells = (p - self.origin) / self.cell_mm;
+        // Of what is not negative a cast is the floor, and cheaper.
+        let at = cells.to_array().map(|cell| cell as usize);
+        let inside = |i: usize| cells[i] >= 0.0 && at[i] < self.counts[i];
         if !(inside(0) && inside(1) && inside(2)) {
             return None;
         }
+        let index = |[x, y, z]: [usize; 3], [nx, ny, _]: [usize; 3]| (z * ny + y) * nx + x;
+        let corner = |at: [usize; 3]| DVec3::from_array(at.map(|i| i as f64));
         if level == 0 {
-            let block = (at / BLOCK as f64).floor();
-            let [nx, ny, _] = self.block_counts;
-            let value = &self.blocks[(block.z as usize * ny + block.y as usize) * nx + block.x as usize];
-            let middle = self.origin + (block + 0.5) * (self.cell_mm * BLOCK as f64);
+            let block = at.map(|i| i / BLOCK);
+            let value = &self.blocks[index(block, self.block_counts)];
+            let middle = self.origin + (corner(block) + 0.5) * (self.cell_mm * BLOCK as f64);
             let mut distance = f32::from_bits(value.load(Ordering::Relaxed));
             if distance.is_nan() {
                 distance = surface
@@ -108,7 +111,7 @@ impl Kept {
                 face: None,
             });
         }
-        let index = (at.z as usize * self.counts[1] + at.y as usize) * self.counts[0] + at.x as usize;
+        let (index, at) = (index(at, self.counts), corner(at));
         let middle = self.origin + (at + 0.5) * self.cell_mm;
         let known = self.look_up(
             surface,

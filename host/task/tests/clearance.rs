@@ -68,6 +68,19 @@ proptest! {
         prop_assert_eq!(assembly.free_share(&group, &[0], &turn, SEARCH_STEP_MM), (1.0, None));
     }
 
+    /// By all cores a motion ends where it ends by one, to the bit.
+    #[test]
+    fn all_cores_find_what_one_finds(
+        slide in prop::array::uniform3(-30.0..30.0f64), tilt in -0.3..0.3f64, shift in prop::array::uniform3(-1.0..1.0f64)
+    ) {
+        let (assembly, inside) = pair();
+        let group = Moved { parts: &[1], by: DAffine3::from_translation(DVec3::from(shift)) * *inside };
+        let motion = Motion { slide: DVec3::from(slide), point: DVec3::ZERO, axis: DVec3::X, angle: tilt };
+        for step_mm in [0.05, SEARCH_STEP_MM, 2.0] {
+            let one = assembly.free_share(&group, &[0], &motion, step_mm);
+            prop_assert_eq!(assembly.free_share_by_cores(&group, &[0], &motion, step_mm), one);
+        }
+    }
 }
 
 proptest! {

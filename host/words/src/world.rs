@@ -320,9 +320,8 @@ impl World {
         for length in [START_MM.min(limit), limit] {
             let near = self.on_the_way(moving, direction, length);
             let step = COARSE_MM.min(length / 2.0);
-            let (share, pair) =
-                self.assembly
-                    .free_share(&group, &near, &Motion::slide(direction * length), step);
+            let motion = Motion::slide(direction * length);
+            let (share, pair) = (self.assembly).free_share_by_cores(&group, &near, &motion, step);
             if pair.is_some() {
                 return (share * length, pair);
             }
