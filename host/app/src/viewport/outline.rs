@@ -26,9 +26,14 @@ pub fn outline(shape: &Shape, feature: Feature, pose: &DAffine3) -> Outline {
         Feature::Center(round) => found.point = frame_of(shape, round).map(|frame| frame.origin),
         Feature::Edge(edge) => found.lines.extend(polyline(shape, edge)),
         Feature::Face(face) => {
-            let edges = shape.faces.get(face as usize).map(|face| &face.edges);
-            let lines = edges.into_iter().flatten().filter_map(|&e| polyline(shape, e));
-            found.lines.extend(lines);
+            let edges = shape.faces.get(face as usize).map(|of| &of.edges);
+            // A seam, which lists its face twice, bounds nothing.
+            let bounds = |e: &&u32| {
+                let edge = shape.edges.get(**e as usize);
+                edge.is_some_and(|edge| edge.faces.iter().filter(|f| **f == face).count() < 2)
+            };
+            let edges = edges.into_iter().flatten().filter(bounds);
+            found.lines.extend(edges.filter_map(|&e| polyline(shape, e)));
         }
         Feature::Axis(round) => {
             found.lines.extend(axis(shape, round).map(Vec::from));

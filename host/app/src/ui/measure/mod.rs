@@ -95,6 +95,7 @@ fn panel(ui: &mut Ui, document: &Document, measure: &mut Measure) {
             .num_columns(2)
             .spacing([12.0, 2.0])
             .show(ui, |ui| {
+                ui.spacing_mut().interact_size.y = 18.0;
                 for line in lines {
                     ui.label(RichText::new(line.name).size(12.5).color(ink.text_weak));
                     ui.label(RichText::new(&line.value).size(12.5).color(ink.text));

@@ -71,7 +71,7 @@ impl Marks<'_> {
         }
     }
 
-    /// A line with a rim in the ground's colour, so that it is told from the parts' edges on any of their colours.
+    /// A line with a rim in the ground's colour, so that it stands out from the parts' edges on any of their colours.
     fn line(&self, points: &[DVec3], stroke: Stroke, dashed: bool) {
         // A point behind the eye has no place in the picture.
         let seen: Option<Vec<Pos2>> = points.iter().map(|&point| self.seen(point)).collect();
