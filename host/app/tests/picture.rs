@@ -8,7 +8,7 @@ use glam::DVec3;
 use mortise::cut::areas::Cutter;
 use mortise::display::mesh::meeting;
 use mortise::session::document::Document;
-use mortise::viewport::camera::{Camera, View};
+use mortise::viewport::camera::{Camera, Projection, View};
 use mortise::viewport::picture::{Areas, Arrow, Cutaway, Fill, Ground, Item, Picture};
 use mortise::viewport::renderer::Renderer;
 use mortise_inspect::CutPlane;
@@ -105,6 +105,12 @@ fn pixel(pixels: &[[u8; 4]], x: u32, y: u32) -> [i32; 3] {
 
 #[test]
 fn parts_are_where_the_camera_looks_in_their_colours() {
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        parts_drawn(projection);
+    }
+}
+
+fn parts_drawn(projection: Projection) {
     let Some((device, queue)) = device() else { return };
     let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample opens");
     let mut renderer = Renderer::new(&device, &queue);
@@ -113,6 +119,7 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
     assert!(!renderer.resize(SIZE), "the same size keeps its texture");
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
     let mut camera = Camera::default();
+    camera.projection = projection;
     camera.look(View::Front);
     camera.fit(document.extent, aspect);
     let at = |point: DVec3| {
@@ -182,6 +189,12 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
 /// The edge between the block's front and top, seen from in front of and above the block's corner.
 #[test]
 fn an_edge_that_touches_stands_out_and_no_other_does() {
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        edges_drawn(projection);
+    }
+}
+
+fn edges_drawn(projection: Projection) {
     let Some((device, queue)) = device() else { return };
     let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample opens");
     let mut renderer = Renderer::new(&device, &queue);
@@ -189,6 +202,7 @@ fn an_edge_that_touches_stands_out_and_no_other_does() {
     renderer.resize(SIZE);
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
     let mut camera = Camera::default();
+    camera.projection = projection;
     camera.look(View::Front);
     camera.fit(document.extent, aspect);
     // Number of nearly white pixels around a point.
@@ -248,6 +262,12 @@ fn face_at(document: &Document, point: DVec3) -> u32 {
 /// The sample cut through its middle, seen from in front: the block has a bore.
 #[test]
 fn a_cut_block_shows_its_area_and_its_bore() {
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        cut_drawn(projection);
+    }
+}
+
+fn cut_drawn(projection: Projection) {
     let Some((device, queue)) = device() else { return };
     let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample opens");
     let mut renderer = Renderer::new(&device, &queue);
@@ -255,6 +275,7 @@ fn a_cut_block_shows_its_area_and_its_bore() {
     renderer.resize(SIZE);
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
     let mut camera = Camera::default();
+    camera.projection = projection;
     camera.look(View::Front);
     camera.fit(document.extent, aspect);
     let plane = CutPlane::new(DVec3::ZERO, -DVec3::Y).expect("a plane");

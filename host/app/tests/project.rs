@@ -104,6 +104,7 @@ fn what_was_done_with_a_model_comes_back() {
     view.see_through = true;
     view.camera.yaw = 0.123;
     view.camera.distance *= 0.5;
+    view.switch_projection();
     let (camera, setting) = (view.camera, view.section.setting);
     harness.run_steps(2);
     // The end of the program saves too.
@@ -127,6 +128,7 @@ fn what_was_done_with_a_model_comes_back() {
         view.camera
     );
     assert!(camera.target.abs_diff_eq(view.camera.target, 1e-5));
+    assert_eq!(camera.projection, view.camera.projection);
 
     // Another model is not touched by it.
     let other = place.path().join("other.step");

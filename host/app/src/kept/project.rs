@@ -271,6 +271,7 @@ mod tests {
                 distance_mm: 120.0,
                 yaw_rad: -0.9,
                 pitch_rad: 0.4,
+                orthographic: true,
                 see_through: true,
                 section: Some(KeptSection {
                     across: KeptAcross::Face {
@@ -422,16 +423,17 @@ mod tests {
             poses(),
             1e-3..1e6f64,
             angles,
-            any::<bool>(),
+            any::<(bool, bool)>(),
             prop::option::of(section),
         )
             .prop_map(
-                |(pose, distance_mm, (yaw_rad, pitch_rad), see_through, section)| {
+                |(pose, distance_mm, (yaw_rad, pitch_rad), (orthographic, see_through), section)| {
                     let view = KeptView {
                         target_mm: pose.translation.to_array(),
                         distance_mm,
                         yaw_rad,
                         pitch_rad,
+                        orthographic,
                         see_through,
                         section,
                     };

@@ -13,6 +13,9 @@ pub struct KeptView {
     pub yaw_rad: f64,
     /// Angle of the camera above the xy plane, rad.
     pub pitch_rad: f64,
+    /// Whether the projection is orthographic.
+    #[serde(default)]
+    pub orthographic: bool,
     /// Whether fixed parts are drawn as glass.
     #[serde(default)]
     pub see_through: bool,
@@ -70,6 +73,7 @@ impl KeptView {
             distance_mm: rounded(self.distance_mm, 1e9),
             yaw_rad: rounded(self.yaw_rad, 1e9),
             pitch_rad: rounded(self.pitch_rad, 1e9),
+            orthographic: self.orthographic,
             see_through: self.see_through,
             section: self.section.map(|section| KeptSection {
                 across: match section.across {

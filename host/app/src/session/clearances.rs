@@ -1,5 +1,6 @@
 //! The list of gaps and clashes between the parts where they are now: searched on request, beside the window's thread.
 
+use std::collections::HashMap;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -10,6 +11,9 @@ use mortise_task::Placed;
 
 use super::document::Document;
 use super::threads::spawn;
+
+/// What is said of a search that [`Search::has_failed`].
+pub const FAILED: &str = "The search ended without a result";
 
 /// Two near parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +67,7 @@ pub struct Found {
 #[derive(Default)]
 struct Kept {
     generation: Option<u64>,
-    solids: Vec<Option<Solid>>,
+    solids: HashMap<usize, Option<Solid>>,
 }
 
 /// Searches on request.
@@ -79,6 +83,35 @@ pub struct Search {
 impl Search {
     /// Starts a search for pairs closer than `within_mm`, unless one is under way. `wake` is called when it is finished.
     pub fn start(&mut self, document: &Document, within_mm: f64, wake: Arc<dyn Fn() + Send + Sync>) {
+        let all = (0..document.model.parts.len()).collect();
+        self.begin(document, all, within_mm, wake);
+    }
+
+    /// Starts a search for the least gap of two parts, however far apart, unless one is under way.
+    pub fn between(&mut self, document: &Document, parts: [usize; 2], wake: Arc<dyn Fn() + Send + Sync>) {
+        let spheres = parts.map(|part| {
+            let shape = document.model.parts.get(part).map(|part| part.shape);
+            let extent = shape.and_then(|shape| document.extents.get(shape)).copied();
+            let (extent, pose) = (extent.unwrap_or_default(), document.poses.get(part));
+            (
+                pose.map_or(DVec3::ZERO, |pose| pose.transform_point3(extent.center)),
+                extent.radius,
+            )
+        });
+        // Each sphere is about its part's surface and touches it somewhere.
+        let [(c, r), (d, s)] = spheres;
+        let within = c.distance(d) + r + s + 1.0;
+        let only = Vec::from([parts[0].min(parts[1]), parts[0].max(parts[1])]);
+        self.begin(document, only, within, wake);
+    }
+
+    fn begin(
+        &mut self,
+        document: &Document,
+        only: Vec<usize>,
+        within_mm: f64,
+        wake: Arc<dyn Fn() + Send + Sync>,
+    ) {
         if self.is_busy() {
             return;
         }
@@ -93,7 +126,8 @@ impl Search {
         spawn("mortise-clearances", move || {
             let found = {
                 let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-                search(&mut kept, &model, poses, generation, within_mm)
+                kept.of(generation);
+                search(&mut kept, &model, &only, poses, within_mm)
             };
             // The window may have been closed.
             _ = outbox.send(found);
@@ -135,16 +169,28 @@ impl Search {
     }
 }
 
-fn search(kept: &mut Kept, model: &CadModel, poses: Vec<DAffine3>, generation: u64, within_mm: f64) -> Found {
-    if kept.generation != Some(generation) {
-        kept.solids = model.shapes.iter().map(Solid::sampled).collect();
-        kept.generation = Some(generation);
+impl Kept {
+    /// Forgets the solids of another document than that of `generation`.
+    fn of(&mut self, generation: u64) {
+        if self.generation.replace(generation) != Some(generation) {
+            self.solids.clear();
+        }
+    }
+}
+
+/// Searches among the parts `only`; those of one shape share its samples.
+fn search(kept: &mut Kept, model: &CadModel, only: &[usize], poses: Vec<DAffine3>, within_mm: f64) -> Found {
+    let shape_of = |part: usize| model.parts.get(part).map(|part| part.shape);
+    for shape in only.iter().filter_map(|&part| shape_of(part)) {
+        let solids = kept.solids.entry(shape);
+        solids.or_insert_with(|| model.shapes.get(shape).and_then(Solid::sampled));
     }
     // Parts without triangles are near to nothing.
-    let (parts, placed): (Vec<usize>, Vec<Placed<'_>>) = (model.parts.iter().zip(&poses).enumerate())
-        .filter_map(|(index, (part, &pose))| {
-            let body = kept.solids.get(part.shape)?.as_ref()?.body()?;
-            Some((index, Placed { body, pose }))
+    let (parts, placed): (Vec<usize>, Vec<Placed<'_>>) = (only.iter())
+        .filter_map(|&part| {
+            let body = kept.solids.get(&shape_of(part)?)?.as_ref()?.body()?;
+            let pose = *poses.get(part)?;
+            Some((part, Placed { body, pose }))
         })
         .unzip();
     let pairs = (clearances(&placed, within_mm).iter())
@@ -155,7 +201,7 @@ fn search(kept: &mut Kept, model: &CadModel, poses: Vec<DAffine3>, generation: u
         })
         .collect();
     Found {
-        generation,
+        generation: kept.generation.unwrap_or_default(),
         poses,
         within_mm,
         pairs,

@@ -9,7 +9,7 @@ use egui::{
 
 use super::theme;
 use crate::session::Session;
-use crate::session::clearances::{Near, Search};
+use crate::session::clearances::{self, Near, Search};
 use crate::session::document::Document;
 use crate::viewport::gesture::{Marked, Viewpoint};
 
@@ -58,7 +58,7 @@ impl Clearances {
         let weak_ink = theme::of(ui).text_weak;
         let weak = |text: &str| RichText::new(text).size(12.0).color(weak_ink);
         if self.search.has_failed() {
-            ui.label(RichText::new("The search ended without a result").color(theme::of(ui).fault_text));
+            ui.label(RichText::new(clearances::FAILED).color(theme::of(ui).fault_text));
         }
         let Some(found) = self.search.found(document) else {
             return;

@@ -70,7 +70,7 @@ pub fn show(ui: &Ui, rect: Rect, document: &Document, view: &Viewpoint) {
     };
     let Some(gaps) = &cut.gaps else { return };
     // From behind the solid hides them.
-    if cut.plane.height(view.camera.eye()) <= 0.0 {
+    if !view.camera.sees_front(cut.plane.origin, cut.plane.normal) {
         return;
     }
     let pointer = ui

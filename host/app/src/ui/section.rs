@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use egui::{Pos2, Rect, RichText, Slider, Ui, UiBuilder, Vec2};
 
-use super::{control, gaps, theme};
+use super::{control, cube, gaps, theme};
 use crate::cut::Across;
 use crate::session::Session;
 use crate::session::document::Document;
@@ -41,7 +41,7 @@ pub fn show(ui: &mut Ui, rect: Rect, top: f32, session: &Session, view: &mut Vie
     let place = Rect::from_min_max(
         Pos2::new(rect.left() + 12.0, top + 4.0),
         Pos2::new(
-            (rect.left() + 690.0).min(rect.right() - 12.0),
+            (rect.left() + 690.0).min(rect.right() - 12.0 - cube::height(rect)),
             rect.bottom().max(top + 4.0),
         ),
     );

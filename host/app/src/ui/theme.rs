@@ -12,6 +12,9 @@ pub const STOP: Color32 = Color32::from_rgb(214, 48, 49);
 /// STOP under the pointer, and the mark of a fault.
 pub const STOP_HOVER: Color32 = Color32::from_rgb(235, 70, 68);
 
+/// Time in which controls change, s; 0 where the desktop asks for less motion. The view then jumps instead of gliding.
+pub const ANIMATION_S: f32 = 0.12;
+
 /// The colours of one theme.
 #[derive(Debug)]
 pub struct Palette {
@@ -138,7 +141,7 @@ fn style_of(mut style: Style, theme: Theme) -> Style {
     spacing.menu_margin = Margin::same(6);
     style.interaction.tooltip_delay = 0.35;
     style.interaction.selectable_labels = false;
-    style.animation_time = 0.12;
+    style.animation_time = ANIMATION_S;
     style.visuals = visuals(theme);
     style
 }

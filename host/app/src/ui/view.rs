@@ -7,11 +7,11 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, fits, gaps, section, theme};
+use super::{control, cube, fits, gaps, measure, section, theme};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
-use crate::viewport::camera::View;
+use crate::viewport::camera::{Projection, View};
 use crate::viewport::compose::{Look, compose, touching_points};
 use crate::viewport::gesture::{Viewpoint, on_screen};
 use crate::viewport::picture::Ground;
@@ -69,12 +69,25 @@ pub fn show(
     let below = toolbar(ui, rect, session, view);
     let below = section::show(ui, rect, below, session, view);
     let below = fits::over_view(ui, rect, below, session, view);
+    let below = measure::show(ui, rect, below, document, view);
     legend(ui, rect, below, session);
+    cube::show(ui, rect, view);
     readout(ui, rect, session);
+    hint(ui, rect, session, view);
+}
+
+/// Says in the lower right corner what pointer and keys do now.
+fn hint(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
     let hint = if view.drags_hand() {
         "Moving the hand · Ctrl turns it"
+    } else if view.measure.on && session.connection().is_some() {
+        "Click: measure · Backspace: clear · D: end measuring · Drag: orbit · Shift or middle: pan · Wheel: zoom"
+    } else if view.measure.on {
+        "Click: measure · Esc: clear, end · D: end measuring · Drag: orbit · Shift or middle: pan · Wheel: zoom"
+    } else if session.is_armed() {
+        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · D: measure · Double click: grab"
     } else {
-        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · Double click: grab"
+        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · 1 3 7 0 5: views · D: measure · Double click: frame"
     };
     ui.painter().text(
         rect.right_bottom() - Vec2::new(14.0, 12.0),
@@ -199,7 +212,7 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) -> 
     let Some(document) = &session.document else {
         return rect.top();
     };
-    let wide = 500.0f32.min(rect.width() - 24.0).max(0.0);
+    let wide = 660.0f32.min(rect.width() - 24.0 - cube::height(rect)).max(0.0);
     let place = Rect::from_min_size(rect.min + Vec2::splat(12.0), Vec2::new(wide, 34.0));
     let ink = theme::of(ui);
     let drawn = ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
@@ -213,11 +226,12 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) -> 
                 view.fit(document.extent, rect);
             }
             for named in View::ALL {
-                let hint = format!("View from: {}", named.name().to_lowercase());
+                let hint = format!("View from: {} ({})", named.name().to_lowercase(), key_of(named));
                 if ui.add(flat(named.name())).on_hover_text(hint).clicked() {
                     view.look(named, document.extent, rect);
                 }
             }
+            projection(ui, view);
             ui.add_space(6.0);
             let through = egui::Button::new(RichText::new("See through").size(12.5))
                 .selected(view.see_through)
@@ -231,9 +245,35 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) -> 
                 view.see_through = !view.see_through;
             }
             section::toggle(ui, document, view);
+            measure::toggle(ui, view);
         });
     });
     drawn.response.rect.bottom()
+}
+
+/// Draws the button of the projection.
+fn projection(ui: &mut Ui, view: &mut Viewpoint) {
+    let parallel = view.camera.projection == Projection::Orthographic;
+    let response = ui
+        .add(control::flat(ui, "Ortho", parallel))
+        .accessible_name("Orthographic")
+        .on_hover_text("Orthographic view: equal lengths look equal at every depth (5)");
+    if response.clicked() {
+        view.switch_projection();
+    }
+}
+
+/// Key of a view, and how to see the opposite side.
+fn key_of(view: View) -> &'static str {
+    match view {
+        View::Iso => "0",
+        View::Front => "1; back: Ctrl+1",
+        View::Right => "3; left: Ctrl+3",
+        View::Top => "7; bottom: Ctrl+7",
+        View::Back => "Ctrl+1",
+        View::Left => "Ctrl+3",
+        View::Bottom => "Ctrl+7",
+    }
 }
 
 /// Legend of the face colours, under the bars, which end at `top`, while a part is held.
@@ -326,7 +366,7 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
     let wide = galleys.iter().map(|g| g.size().x).fold(0.0, f32::max);
     let high: f32 = galleys.iter().map(|g| g.size().y + 3.0).sum();
     let card = Rect::from_min_size(
-        Pos2::new(rect.right() - wide - 38.0, rect.top() + 12.0),
+        Pos2::new(rect.right() - wide - 38.0, rect.top() + 12.0 + cube::height(rect)),
         Vec2::new(wide + 26.0, high + 15.0),
     );
     painter.rect(

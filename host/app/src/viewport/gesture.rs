@@ -4,13 +4,16 @@ use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Response, Ui};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use super::camera::{Camera, View};
+use super::measure::Measure;
 use super::pick::{Pick, pick};
+pub use super::screen::on_screen;
+use super::screen::{aspect, ndc};
 use crate::cut::SectionView;
 use crate::display::extent::Extent;
 use crate::session::document::Document;
 use crate::session::insertion::hold;
 use crate::session::pose::moved;
-use crate::session::{Intent, Session};
+use crate::session::{Intent, Session, obstacle};
 
 /// Rotation of the hand for a drag over the full height, rad.
 const HAND_TURN: f64 = 1.5;
@@ -22,7 +25,8 @@ const ZOOM_PER_POINT: f64 = 0.004;
 /// Target of a drag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Drag {
-    Orbit,
+    /// About the point under the pointer at the start, or else the target.
+    Orbit(DVec3),
     Pan,
     /// The held part, dragged at `anchor`; `handle` is the handle's pose at the start.
     Hand {
@@ -55,27 +59,12 @@ pub struct Viewpoint {
     pub marked: Marked,
     /// What was clicked last, in the open document.
     pub picked: Option<Pick>,
+    /// The measuring tool.
+    pub measure: Measure,
     pub(super) goal: Option<Camera>,
     drag: Option<Drag>,
     /// Document at which the camera looks.
     pub(super) seen: Option<u64>,
-}
-
-fn ndc(rect: Rect, at: Pos2) -> DVec2 {
-    let x = f64::from((at.x - rect.left()) / rect.width());
-    let y = f64::from((at.y - rect.top()) / rect.height());
-    DVec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y)
-}
-
-fn aspect(rect: Rect) -> f64 {
-    f64::from((rect.width() / rect.height().max(1.0)).max(0.01))
-}
-
-/// Screen position of a point of the world.
-pub fn on_screen(camera: &Camera, rect: Rect, point: DVec3) -> Option<Pos2> {
-    let at = camera.project(point, aspect(rect))?;
-    let (x, y) = (0.5 * (at.x + 1.0), 0.5 * (1.0 - at.y));
-    Some(rect.min + egui::vec2(x as f32 * rect.width(), y as f32 * rect.height()))
 }
 
 impl Viewpoint {
@@ -125,15 +114,28 @@ impl Viewpoint {
         if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::X)) {
             self.section.toggle(document, self.camera.backward());
         }
-        if response.clicked() {
+        if !typing {
+            self.turn_keys(ui, extent, rect);
+            let escape_is_taken = session.connection().is_some() || session.wants_path.is_some();
+            self.measure.keys(ui, escape_is_taken);
+        }
+        if self.measure.on {
+            let shown = self.section.shown(document);
+            self.measure.respond(response, document, shown, &self.camera);
+        } else if response.clicked() {
             let hit = self.pick(document, rect, response.interact_pointer_pos());
             (self.picked, self.marked) = (hit, Marked::default());
             wanted.push(Intent::Select(hit.map(|h| h.part)));
         }
         if response.double_clicked()
+            && !self.measure.on
             && let Some(hit) = self.pick(document, rect, response.interact_pointer_pos())
         {
-            wanted.push(Intent::Grab(hit.part));
+            let grab = Intent::Grab(hit.part);
+            match obstacle(session, &grab) {
+                None => wanted.push(grab),
+                Some(_) => self.frame_part(document, hit.part, rect),
+            }
         }
         self.start_drag(ui, response, session);
         self.go_on_dragging(ui, response, session);
@@ -144,7 +146,9 @@ impl Viewpoint {
     }
 
     fn pick(&self, document: &Document, rect: Rect, at: Option<Pos2>) -> Option<Pick> {
-        let (origin, direction) = self.camera.ray(ndc(rect, at?), aspect(rect));
+        let (origin, direction) = self
+            .camera
+            .ray_before(ndc(rect, at?), aspect(rect), document.extent);
         pick(
             &document.model,
             &document.extents,
@@ -166,17 +170,17 @@ impl Viewpoint {
             self.drag = Some(Drag::Pan);
             return;
         }
-        self.drag = Some(Drag::Orbit);
+        let pressed = ui.input(|i| i.pointer.press_origin());
+        let document = session.document.as_ref();
+        let under = document.and_then(|document| self.pick(document, response.rect, pressed));
+        self.drag = Some(Drag::Orbit(under.map_or(self.camera.target, |hit| hit.point)));
         let simulated = session.connection().is_some_and(|c| c.capabilities.simulated);
-        let (Some(document), Some(held), Some(handle)) =
-            (&session.document, session.grabbed(), session.handle())
-        else {
+        let (Some(held), Some(handle)) = (session.grabbed(), session.handle()) else {
             return;
         };
-        let pressed = ui.input(|i| i.pointer.press_origin());
         if left
             && simulated
-            && let Some(hit) = self.pick(document, response.rect, pressed)
+            && let Some(hit) = under
             && hit.part == held
         {
             self.drag = Some(Drag::Hand {
@@ -200,9 +204,9 @@ impl Viewpoint {
         let by = DVec2::new(f64::from(by.x), f64::from(by.y)) / f64::from(rect.height().max(1.0));
         match &mut self.drag {
             None => {}
-            Some(Drag::Orbit) => {
+            Some(Drag::Orbit(pivot)) => {
                 self.goal = None;
-                self.camera.orbit(by);
+                self.camera.orbit_about(*pivot, by);
             }
             Some(Drag::Pan) => {
                 self.goal = None;
@@ -221,8 +225,7 @@ impl Viewpoint {
                     *turn = (about_up * about_right * *turn).normalize();
                 } else {
                     // The drag moves a point at the anchor's depth with the pointer.
-                    let depth = (camera.eye() - *anchor).dot(camera.backward());
-                    let height = 2.0 * depth * (0.5 * super::camera::FIELD_OF_VIEW).tan();
+                    let height = camera.height_at(*anchor);
                     *shift += height * (by.x * camera.right() - by.y * camera.up());
                 }
                 let target = moved(handle, *anchor, *turn, *shift);
@@ -251,9 +254,14 @@ impl Viewpoint {
         self.camera.zoom_at(anchor, factor, document.extent);
     }
 
-    /// Covers most of the way in a tenth of a second.
+    /// Covers most of the way in a tenth of a second, or all of it at once where the style has no animation.
     fn glide(&mut self, ui: &Ui) {
         let Some(goal) = self.goal else { return };
+        if ui.style().animation_time == 0.0 {
+            (self.camera, self.goal) = (goal, None);
+            ui.ctx().request_repaint();
+            return;
+        }
         let dt = f64::from(ui.input(|i| i.stable_dt)).min(0.1);
         self.camera = self.camera.towards(&goal, 1.0 - (-dt / 0.07).exp());
         let left = (self.camera.target - goal.target).length() / goal.distance

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use super::camera::Camera;
+use super::camera::{Camera, Projection};
 use super::gesture::Viewpoint;
 use crate::cut::{Across, Setting};
 use crate::kept::view::{KeptAcross, KeptSection, KeptView};
@@ -20,6 +20,7 @@ impl Viewpoint {
             distance_mm: camera.distance,
             yaw_rad: camera.yaw,
             pitch_rad: camera.pitch,
+            orthographic: camera.projection == Projection::Orthographic,
             see_through: self.see_through,
             section,
         };
@@ -33,6 +34,10 @@ impl Viewpoint {
             distance: view.distance_mm,
             yaw: view.yaw_rad,
             pitch: view.pitch_rad.clamp(-FRAC_PI_2, FRAC_PI_2),
+            projection: match view.orthographic {
+                true => Projection::Orthographic,
+                false => Projection::Perspective,
+            },
         };
         self.goal = None;
         self.picked = None;

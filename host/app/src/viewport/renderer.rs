@@ -8,7 +8,7 @@ use eframe::wgpu;
 use glam::{DAffine3, DMat4, DVec3};
 use wgpu::util::DeviceExt as _;
 
-use super::camera::FIELD_OF_VIEW;
+use super::camera::Projection;
 use super::picture::{Areas, Cutaway, Fill, Item, MAX_LIT, MAX_LIT_EDGES, Picture, arrow_poses};
 use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
 use super::solids;
@@ -156,9 +156,12 @@ impl Renderer {
             .collect();
         let (solid, mut seen_through): (Vec<&Item>, Vec<&Item>) =
             items.into_iter().partition(|i| i.opacity >= 1.0);
-        let eye = picture.camera.eye();
+        let camera = &picture.camera;
         seen_through.sort_by(|a, b| {
-            let far = |i: &Item| (i.pose.translation - eye).length_squared();
+            let far = |i: &Item| match camera.projection {
+                Projection::Perspective => (i.pose.translation - camera.eye()).length_squared(),
+                Projection::Orthographic => -i.pose.translation.dot(camera.backward()),
+            };
             far(b).total_cmp(&far(a))
         });
         let pieces: Vec<([DAffine3; 2], [f32; 4])> = picture
@@ -264,7 +267,11 @@ fn globals(picture: &Picture, size: [u32; 2]) -> Globals {
     let camera = &picture.camera;
     let (right, up, viewer) = (camera.right(), camera.up(), camera.backward());
     let (near, far) = camera.depth_range(picture.extent);
-    let lift = LINE_LIFT * near * far / (near - far);
+    // See `lines_vertex`. Parallel rays have a depth that is linear, and the target's distance for a scale.
+    let lift = match camera.projection {
+        Projection::Perspective => LINE_LIFT * near * far / (near - far),
+        Projection::Orthographic => LINE_LIFT * camera.distance / (near - far),
+    };
     let direction = |v: DVec3| v.normalize().as_vec3().extend(0.0).to_array();
     Globals {
         key: direction(viewer + 0.55 * up - 0.45 * right),
@@ -282,7 +289,7 @@ fn matrix(m: DMat4) -> [f32; 16] {
 
 /// Distance of two lines of a hatching, mm: constant while the camera moves a little, for it is a power of two.
 fn hatch_spacing(picture: &Picture, size: [u32; 2]) -> f64 {
-    let pixel = 2.0 * picture.camera.distance * (0.5 * FIELD_OF_VIEW).tan() / f64::from(size[1]);
+    let pixel = picture.camera.height_at(picture.camera.target) / f64::from(size[1]);
     (HATCH_WIDTHS * f64::from(picture.line_width) * pixel)
         .log2()
         .ceil()

@@ -218,7 +218,7 @@ fn lines_vertex(
     let width = globals.screen.z * select(1.0, LIT_WIDER, lit);
     let shift = side * across * width / globals.screen.xy;
     // Depth is A + B/w. Brought a fraction e nearer to the eye a point has depth A + B/(w(1 - e)), about e·B/w less;
-    // screen.w holds e·B, which is negative.
+    // screen.w holds e·B, which is negative. Of parallel rays w is 1 and depth is linear: screen.w holds the shift for a distance like the target's.
     let nearer = globals.screen.w * select(1.0, LIT_NEARER, lit);
     let position = vec4<f32>(end.xy + shift * end.w, end.z + nearer, end.w);
     return Line(position, select(draw.line, vec4<f32>(LIT_EDGE, 1.0), lit), height);
