@@ -4,7 +4,10 @@ use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Response, Ui};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use super::camera::{Camera, View};
+use super::handles::Handles;
 use super::pick::{Pick, pick};
+pub use super::sight::on_screen;
+use super::sight::{aspect, ndc};
 use crate::cut::SectionView;
 use crate::display::extent::Extent;
 use crate::session::document::Document;
@@ -55,27 +58,12 @@ pub struct Viewpoint {
     pub marked: Marked,
     /// What was clicked last, in the open document.
     pub picked: Option<Pick>,
+    /// Handles of the selected part.
+    pub handles: Handles,
     pub(super) goal: Option<Camera>,
     drag: Option<Drag>,
     /// Document at which the camera looks.
     pub(super) seen: Option<u64>,
-}
-
-fn ndc(rect: Rect, at: Pos2) -> DVec2 {
-    let x = f64::from((at.x - rect.left()) / rect.width());
-    let y = f64::from((at.y - rect.top()) / rect.height());
-    DVec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y)
-}
-
-fn aspect(rect: Rect) -> f64 {
-    f64::from((rect.width() / rect.height().max(1.0)).max(0.01))
-}
-
-/// Screen position of a point of the world.
-pub fn on_screen(camera: &Camera, rect: Rect, point: DVec3) -> Option<Pos2> {
-    let at = camera.project(point, aspect(rect))?;
-    let (x, y) = (0.5 * (at.x + 1.0), 0.5 * (1.0 - at.y));
-    Some(rect.min + egui::vec2(x as f32 * rect.width(), y as f32 * rect.height()))
 }
 
 impl Viewpoint {
@@ -109,6 +97,7 @@ impl Viewpoint {
     /// Handles all pointer and key input over the view.
     pub fn respond(&mut self, ui: &Ui, response: &Response, session: &mut Session, wanted: &mut Vec<Intent>) {
         let rect = response.rect;
+        let on_handle = self.handles.respond(ui, response, session, &self.camera);
         let Some(document) = &session.document else { return };
         let extent = document.extent;
         if self.seen != Some(document.generation) {
@@ -125,15 +114,21 @@ impl Viewpoint {
         if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::X)) {
             self.section.toggle(document, self.camera.backward());
         }
-        if response.clicked() {
+        if response.clicked() && !on_handle {
             let hit = self.pick(document, rect, response.interact_pointer_pos());
             (self.picked, self.marked) = (hit, Marked::default());
             wanted.push(Intent::Select(hit.map(|h| h.part)));
         }
         if response.double_clicked()
+            && !on_handle
             && let Some(hit) = self.pick(document, rect, response.interact_pointer_pos())
         {
             wanted.push(Intent::Grab(hit.part));
+        }
+        if self.handles.hold().is_some() {
+            // The part follows the pointer, so the camera rests.
+            self.goal = None;
+            return;
         }
         self.start_drag(ui, response, session);
         self.go_on_dragging(ui, response, session);

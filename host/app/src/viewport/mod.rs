@@ -3,10 +3,14 @@
 pub mod camera;
 pub mod compose;
 pub mod gesture;
+pub mod gizmo;
+pub mod handles;
+pub mod hold;
 mod kept;
 pub mod pick;
 pub mod picture;
 mod pipelines;
 pub mod renderer;
+pub mod sight;
 mod solids;
 pub mod surface;
