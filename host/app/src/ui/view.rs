@@ -7,7 +7,7 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, fits, gaps, section, theme};
+use super::{control, fits, gaps, handles, section, theme};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
@@ -65,6 +65,7 @@ pub fn show(
     touching(ui, rect, session, view);
     gaps::show(ui, rect, document, view);
     marked(ui, rect, view);
+    handles::show(ui, rect, session, view);
     triad(ui, rect, view);
     let below = toolbar(ui, rect, session, view);
     let below = section::show(ui, rect, below, session, view);
@@ -73,8 +74,10 @@ pub fn show(
     readout(ui, rect, session);
     let hint = if view.drags_hand() {
         "Moving the hand · Ctrl turns it"
+    } else if view.handles.over().is_some() {
+        "Drag: move the part · Ctrl: steps, with Shift finer · Esc: take back"
     } else {
-        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · Double click: grab"
+        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · Double click: grab · F1: keys"
     };
     ui.painter().text(
         rect.right_bottom() - Vec2::new(14.0, 12.0),
