@@ -18,6 +18,7 @@ impl Session {
         if !intent.is_passive() {
             self.tour = None;
         }
+        self.watch_moves();
         self.perform(intent);
         self.follow();
     }
@@ -30,13 +31,22 @@ impl Session {
             }
         }
         self.poll_instruction();
+        self.poll_drag();
         self.follow();
     }
 
-    /// Actions that follow from the state: upload once document and board are present; next step of a demonstration.
+    /// Actions that follow from the state: history of moves; upload; next step of a demonstration.
     fn follow(&mut self) {
+        self.watch_moves();
+        self.upload_if_due();
+        advance(self);
+    }
+
+    /// Uploads the scene once document and board are present, and no part is being dragged.
+    pub(super) fn upload_if_due(&mut self) {
         let ready = (self.document.as_ref()).is_some_and(|d| d.baked.is_some());
         if ready
+            && self.moves.dragged().is_none()
             && !self.scene_is_on_board()
             && !self.scene_was_refused()
             && self.device() == Some(DeviceState::Idle)
@@ -44,6 +54,5 @@ impl Session {
         {
             self.upload();
         }
-        advance(self);
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use mortise_bake::Baked;
 use mortise_brep::{CadModel, LoadOptions, load_step_while};
 use sha2::{Digest as _, Sha256};
@@ -145,6 +145,23 @@ impl Document {
             self.extent = extent_of(&self.model, &poses);
             self.poses.clone_from(&poses);
             self.placed = poses;
+        }
+    }
+
+    /// Middle of a part where it is now: the centre of its bounding box, world, mm.
+    pub fn middle(&self, part: usize) -> Option<DVec3> {
+        let shape = self.model.parts.get(part)?.shape;
+        let center = self.extents.get(shape).copied().unwrap_or_default().center;
+        Some(self.poses.get(part)?.transform_point3(center))
+    }
+
+    /// Enlarges the bounding sphere of all parts to one that is being moved, so that it stays in sight.
+    pub fn extend_to(&mut self, part: usize) {
+        let shape = self.model.parts.get(part).map(|part| part.shape);
+        let own = shape.and_then(|shape| self.extents.get(shape)).copied();
+        if let (Some(own), Some(center)) = (own, self.middle(part)) {
+            let reach = center.distance(self.extent.center) + own.radius;
+            self.extent.radius = self.extent.radius.max(reach);
         }
     }
 

@@ -135,8 +135,10 @@ impl Session {
         };
         *place = pose;
         let (part, other) = (document.part_name(moving), document.part_name(offer.against));
-        let text = format!("Placed {part} in its fit with {other}; Reset parts puts every part back");
+        let text = format!("Placed {part} in its fit with {other}; Ctrl+Z undoes it");
+        let name = format!("place {part} in its fit with {other}");
         self.place(poses);
+        self.note_step(&name);
         self.notes.add(Severity::Good, text);
         self.drop_fits();
     }

@@ -4,6 +4,9 @@ use std::sync::Arc;
 use std::sync::mpsc::{TryRecvError, sync_channel};
 
 use mortise_words::Outcome;
+use mortise_words::grammar::parse;
+use mortise_words::phrase::Command;
+use mortise_words::token::{LONGEST, Names, read};
 
 use super::instructions::{Answer, Running, Said, answer, carry_out};
 use super::state::Session;
@@ -12,6 +15,11 @@ use super::threads::spawn;
 impl Session {
     /// Starts an instruction, which must be possible.
     pub(super) fn instruct(&mut self, text: &str) {
+        if let Some(back) = self.instructs_to_rewind(text) {
+            self.instructions.remember(text);
+            self.instructions.answer = Some(self.rewound(text, back));
+            return;
+        }
         let Some(document) = &self.document else { return };
         let (outbox, said) = sync_channel(1);
         let (model, generation) = (Arc::clone(&document.model), document.generation);
@@ -34,6 +42,37 @@ impl Session {
             _ = outbox.send(Said { turn });
             wake();
         });
+    }
+
+    /// Whether an instruction undoes (`true`) or redoes (`false`) the last move of whatever kind: there is one history of all moves.
+    fn instructs_to_rewind(&self, text: &str) -> Option<bool> {
+        let parts = &self.document.as_ref()?.model.parts;
+        if text.len() > LONGEST {
+            return None;
+        }
+        let names = Names::new(parts.iter().map(|part| part.name.as_str()));
+        match parse(&read(text, &names)).ok()?[..] {
+            [Command::Undo] => Some(true),
+            [Command::Redo] => Some(false),
+            _ => None,
+        }
+    }
+
+    fn rewound(&mut self, text: &str, back: bool) -> Answer {
+        let done = if back { "undone" } else { "redone" };
+        let (outcome, words) = match self.no_rewinding(back) {
+            Some(why) => (Outcome::Refuse, why),
+            None => match self.rewind(back) {
+                Some(name) => (Outcome::Done, format!("{done}: {name}")),
+                None => (Outcome::Refuse, "nothing was moved".to_owned()),
+            },
+        };
+        Answer {
+            text: text.to_owned(),
+            outcome,
+            words,
+            parts: Vec::new(),
+        }
     }
 
     /// Forgets the instruction under way: its thread ends by itself, and moves nothing.
@@ -87,6 +126,7 @@ impl Session {
             }
             // A board gets the scene with the parts here.
             self.place(poses);
+            self.note_step(&format!("\"{}\"", running.text));
         }
         let Some(document) = &self.document else {
             return refused("no file is open");

@@ -30,6 +30,25 @@ pub(super) struct Talk {
     words: Words,
 }
 
+impl Talk {
+    /// Whether the talk has the parts at `poses`, mm.
+    fn is_at(&self, poses: &[DAffine3]) -> bool {
+        let parts = self.words.parts().iter();
+        parts.map(|part| part.placement).eq(poses.iter().copied())
+    }
+
+    /// Undoes or redoes its own last instruction where that brings the parts to `poses`.
+    fn follow(&mut self, poses: &[DAffine3], back: bool) {
+        if self.is_at(poses) {
+            return;
+        }
+        let (there, here) = if back { ("undo", "redo") } else { ("redo", "undo") };
+        if self.words.say(there).outcome == Outcome::Done && !self.is_at(poses) {
+            self.words.say(here);
+        }
+    }
+}
+
 /// The end of an instruction.
 pub(super) struct Said {
     /// The talk, what became of the instruction, and where the parts then are; or why the assembly takes no instructions.
@@ -78,6 +97,13 @@ impl Instructions {
         };
     }
 
+    /// Lets the talk go with parts that undo or redo has put to `poses`, mm, so that what it knows of them stays.
+    pub(super) fn follow(&mut self, poses: &[DAffine3], back: bool) {
+        if let Some(talk) = &mut self.talk {
+            talk.follow(poses, back);
+        }
+    }
+
     pub(super) fn remember(&mut self, text: &str) {
         if self.given.last().is_none_or(|last| last != text) {
             self.given.push(text.to_owned());
@@ -95,14 +121,7 @@ pub(super) fn carry_out(
     poses: &[DAffine3],
     text: &str,
 ) -> Result<(Box<Talk>, Turn, Vec<DAffine3>), String> {
-    let as_left = |talk: &Talk| {
-        talk.words
-            .parts()
-            .iter()
-            .map(|p| p.placement)
-            .eq(poses.iter().copied())
-    };
-    let mut talk = match talk.filter(|talk| as_left(talk)) {
+    let mut talk = match talk.filter(|talk| talk.is_at(poses)) {
         Some(talk) => talk,
         None => {
             let mut model = model.clone();
@@ -147,11 +166,7 @@ pub(super) fn answer(document: &Document, text: &str, turn: &Turn) -> Answer {
 /// What was done, in words.
 fn done(turn: &Turn) -> String {
     if turn.acts.is_empty() {
-        return match turn.moved.len() {
-            0 => "nothing to connect or move".to_owned(),
-            1 => format!("{} moved back", turn.moved[0].part),
-            several => format!("{several} parts moved back"),
-        };
+        return "nothing to connect or move".to_owned();
     }
     let acts: Vec<String> = turn.acts.iter().map(act).collect();
     acts.join("; ")

@@ -14,6 +14,7 @@ use mortise_rig::RigSpec;
 
 use super::finding::NO_FIT;
 use super::link::Link;
+use super::moves::Motion;
 use super::state::Session;
 
 /// An action that the operator requests.
@@ -69,6 +70,12 @@ pub enum Intent {
     Release,
     /// Move every part back to its position in the file.
     ResetScene,
+    /// Move a part by keys or numbers.
+    Move(Motion),
+    /// Undo the last move of parts, whatever made it.
+    Undo,
+    /// Redo the move undone last.
+    Redo,
     /// Change a parameter.
     SetParameter(ParameterId, f32),
     /// Reset every parameter to its default.
@@ -278,6 +285,9 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(_) if !session.scene_is_on_board() => no("The collision model is not on the board"),
             Some(_) => None,
         },
+        Intent::Move(motion) => session.no_moving(motion.part),
+        Intent::Undo => session.no_rewinding(true),
+        Intent::Redo => session.no_rewinding(false),
         Intent::SetParameter(..) | Intent::ResetParameters => {
             session.connection().is_none().then(|| NO_RIG.to_owned())
         }

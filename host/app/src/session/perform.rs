@@ -72,6 +72,9 @@ impl Session {
             Intent::Grab(part) => self.grab(part),
             Intent::Release => self.request(ToDevice::Release),
             Intent::ResetScene => self.put_back(),
+            Intent::Move(motion) => self.move_part(&motion),
+            Intent::Undo => _ = self.rewind(true),
+            Intent::Redo => _ = self.rewind(false),
             Intent::SetParameter(id, value) => self.set_parameter(id, value),
             Intent::ResetParameters => {
                 for row in PARAMETERS {

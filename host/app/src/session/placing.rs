@@ -3,6 +3,7 @@
 use glam::DAffine3;
 use mortise_protocol::message::ToDevice;
 
+use super::moves::PUT_BACK;
 use super::state::Session;
 
 impl Session {
@@ -12,7 +13,12 @@ impl Session {
             Some("Only while the motors are off: disarm first")
         } else {
             let uploads = self.connection().is_some_and(|c| c.upload.is_some());
-            uploads.then_some("Wait until the collision model is on the board")
+            let drags = self.moves.dragged().is_some();
+            match (uploads, drags) {
+                (true, _) => Some("Wait until the collision model is on the board"),
+                (_, true) => Some("Let go of the part that is being dragged first"),
+                _ => None,
+            }
         }
     }
 
@@ -41,10 +47,12 @@ impl Session {
         if document.is_placed() {
             let poses = document.file_poses();
             self.place(poses);
+            self.note_step(PUT_BACK);
         } else if let Some(connection) = self.connection() {
             connection.request(ToDevice::ResetScene);
         } else if let Some(document) = &mut self.document {
             document.reset_poses();
+            self.note_step(PUT_BACK);
         }
     }
 }

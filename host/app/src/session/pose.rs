@@ -40,6 +40,12 @@ pub fn moved(pose: &DAffine3, pivot: DVec3, turn: DQuat, shift: DVec3) -> DAffin
     about * *pose
 }
 
+/// The pose without the rounding of its rotation, which must not add up over many turns.
+pub fn rigid(pose: &DAffine3) -> DAffine3 {
+    let turn = DQuat::from_mat3(&pose.matrix3).normalize();
+    DAffine3::from_rotation_translation(turn, pose.translation)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

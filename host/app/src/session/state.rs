@@ -22,6 +22,7 @@ use super::history::History;
 use super::instructions::Instructions;
 use super::keeper::Keeper;
 use super::link::{Connection, Link};
+use super::moves::Moves;
 use super::notes::Notes;
 use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
@@ -134,6 +135,8 @@ pub struct Session {
     pub(super) own_parameters: BTreeMap<String, OwnParameters>,
     /// Instructions in plain words.
     pub instructions: Instructions,
+    /// What was moved, which can be undone.
+    pub moves: Moves,
     pub(super) keeper: Keeper,
     /// The project that the user opened, and its file: for the document of this number.
     pub(super) pending_project: Option<(u64, Box<Project>, PathBuf)>,
@@ -183,6 +186,7 @@ impl Session {
             fits: BTreeMap::new(),
             own_parameters: BTreeMap::new(),
             instructions: Instructions::default(),
+            moves: Moves::default(),
             keeper: Keeper::default(),
             pending_project: None,
             tour: None,

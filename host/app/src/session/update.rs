@@ -13,6 +13,7 @@ use super::history::Sample;
 use super::insertion::Wall;
 use super::intent::Intent;
 use super::link::{Command, Connection, Link};
+use super::moves::PUT_BACK;
 use super::notes::Severity;
 use super::outbox::{CollisionModel, Imported, LinkUpdate, Update};
 use super::pose;
@@ -378,6 +379,7 @@ fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String
     }
     if let (ToDevice::ResetScene, Some(document)) = (message, &mut session.document) {
         document.reset_poses();
+        session.note_step(PUT_BACK);
         session.verdict = None;
         session.command_guidance(GuidanceCommand::PutBack);
     }

@@ -6,7 +6,7 @@ use super::{control, recent, theme};
 use crate::session::{Intent, Session};
 
 /// Draws the button that opens the menu.
-pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
+pub fn show(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<Intent>, height: f32) {
     let button = Button::new("").min_size(Vec2::new(26.0, height));
     let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
         ui.set_min_width(240.0);
@@ -14,6 +14,11 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f3
         let save = Button::new("Save project as…").frame(false);
         let hint = "Write placements, hidden parts, choices of fits, settings, signals and the rig to a file. They also save themselves, and come back when the model is opened again";
         if control::intent_button(ui, session, wanted, save, Intent::SaveProject, hint).clicked() {
+            ui.close();
+        }
+        let keys = Button::new("Keys").frame(false);
+        if ui.add(keys).on_hover_text("What the keys and the pointer do (F1)").clicked() {
+            *help = true;
             ui.close();
         }
         control::divider(ui);

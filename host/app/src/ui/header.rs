@@ -4,7 +4,7 @@ use egui::{Align, Layout, RichText, Ui, Vec2};
 use mortise_protocol::message::DeviceState;
 use mortise_rig::describe;
 
-use super::{control, file_menu, stop, theme};
+use super::{control, file_menu, stop, theme, undo};
 use crate::session::link::Link;
 use crate::session::{Intent, Session};
 
@@ -54,7 +54,7 @@ pub fn height(width: f32) -> f32 {
 }
 
 /// Draws the bar. STOP and the state are placed first, at the right and as wide as they need; the rest takes the remaining width.
-pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+pub fn show(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<Intent>) {
     let shape = Shape::of(ui.max_rect().width());
     egui::Panel::top("header")
         .exact_size(shape.height())
@@ -73,7 +73,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 state(ui, session, ui.available_width().min(STATE_WIDTH));
                 if shape.rows == 1 {
                     let left = Layout::left_to_right(Align::Center);
-                    ui.with_layout(left, |ui| file(ui, session, wanted, shape.arm.y - 4.0));
+                    ui.with_layout(left, |ui| file(ui, session, help, wanted, shape.arm.y - 4.0));
                 }
             });
             if shape.rows == 2 {
@@ -81,14 +81,14 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 ui.allocate_ui_with_layout(row, from_right, |ui| {
                     arm(ui, session, wanted, shape.arm);
                     let left = Layout::left_to_right(Align::Center);
-                    ui.with_layout(left, |ui| file(ui, session, wanted, shape.arm.y));
+                    ui.with_layout(left, |ui| file(ui, session, help, wanted, shape.arm.y));
                 });
             }
         });
 }
 
-/// The program's mark and the open file.
-fn file(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
+/// The program's mark, the open file, and its history.
+fn file(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<Intent>, height: f32) {
     if ui.available_width() > 220.0 {
         let (rect, _) = ui.allocate_exact_size(Vec2::splat(26.0), egui::Sense::hover());
         control::mark(ui, rect, theme::of(ui).text);
@@ -100,7 +100,10 @@ fn file(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
     let hint = "Open a STEP file or a project (Ctrl+O)";
     control::intent_button(ui, session, wanted, open, Intent::Browse, hint);
     if ui.available_width() > 40.0 {
-        file_menu::show(ui, session, wanted, height);
+        file_menu::show(ui, session, help, wanted, height);
+    }
+    if session.document.is_some() && ui.available_width() > 2.0 * (undo::WIDTH + GAP) {
+        undo::show(ui, session, wanted, height);
     }
     if ui.available_width() > 40.0 {
         title(ui, session);

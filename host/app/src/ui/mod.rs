@@ -16,9 +16,13 @@ mod fits;
 pub mod fonts;
 mod gaps;
 mod guidance;
+mod handles;
 mod header;
+pub mod keys;
 mod measure;
 mod messages;
+mod motion;
+mod nudge;
 mod open;
 mod parameters;
 mod parts;
@@ -28,6 +32,7 @@ mod rig;
 mod section;
 mod stop;
 pub mod theme;
+mod undo;
 mod view;
 
 use std::time::Duration;
@@ -66,6 +71,8 @@ pub struct Window {
     pub plots: plots::View,
     clearances: clearances::Clearances,
     command: command::CommandLine,
+    motion: motion::Fields,
+    help: keys::Help,
 }
 
 impl Window {
@@ -84,6 +91,8 @@ impl Window {
             plots,
             clearances: clearances::Clearances::default(),
             command: command::CommandLine::default(),
+            motion: motion::Fields::default(),
+            help: keys::Help::default(),
         }
     }
 
@@ -93,10 +102,15 @@ impl Window {
         self.clearances.poll();
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
+        let stops = wanted.contains(&Intent::Stop);
+        self.view.handles.keys(ui, &mut self.session, stops);
         self.command.keys(ui);
+        self.help.keys(ui);
         shortcuts(ui, &self.session, &mut wanted);
+        undo::keys(ui, &mut wanted);
+        nudge::keys(ui, &self.session, &self.view, &mut wanted);
         let size = ui.max_rect().size();
-        header::show(ui, &self.session, &mut wanted);
+        header::show(ui, &self.session, &mut self.help.open, &mut wanted);
         self.command.show(ui, &self.session, &mut wanted);
         match Arrangement::of(size) {
             Arrangement::Wide => self.wide(ui, surface, &mut wanted),
@@ -104,6 +118,7 @@ impl Window {
         }
         drop::show(ui, &mut self.session, &mut wanted);
         self.path.show(ui, &mut self.session, &mut wanted);
+        self.help.show(ui, header::height(size.x));
         self.command
             .finish(ui, &self.session, &mut self.view, &mut wanted);
         // STOP is handled before the other intents of the same frame.
@@ -179,7 +194,14 @@ impl Window {
                 egui::CentralPanel::default()
                     .frame(egui::Frame::NONE)
                     .show(ui, |ui| {
-                        parts::show(ui, session, &self.view.marked.parts, &mut self.search, wanted)
+                        parts::show(
+                            ui,
+                            session,
+                            &mut self.view,
+                            &mut self.motion,
+                            &mut self.search,
+                            wanted,
+                        )
                     });
             });
         egui::Panel::right("rig")
@@ -233,7 +255,14 @@ impl Window {
             arrange::Tab::Rig => rig::show(ui, session, wanted),
             arrange::Tab::Parts => {
                 below(ui, &mut self.clearances, session, &mut self.view);
-                parts::show(ui, session, &self.view.marked.parts, &mut self.search, wanted);
+                parts::show(
+                    ui,
+                    session,
+                    &mut self.view,
+                    &mut self.motion,
+                    &mut self.search,
+                    wanted,
+                );
             }
             arrange::Tab::Messages => messages::show(ui, session),
             arrange::Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),

@@ -7,13 +7,21 @@ use egui::{
 };
 use mortise_brep::Surface;
 
-use super::{control, eye, theme};
+use super::{control, eye, motion, theme};
 use crate::session::document::Document;
 use crate::session::tree::{self, Branch};
 use crate::session::{Intent, Session, obstacle};
+use crate::viewport::gesture::Viewpoint;
 
 /// Draws the list.
-pub fn show(ui: &mut Ui, session: &Session, marked: &[usize], search: &mut String, wanted: &mut Vec<Intent>) {
+pub fn show(
+    ui: &mut Ui,
+    session: &Session,
+    view: &mut Viewpoint,
+    fields: &mut motion::Fields,
+    search: &mut String,
+    wanted: &mut Vec<Intent>,
+) {
     ui.take_available_width();
     heading(ui, session, wanted);
     ui.add_space(4.0);
@@ -25,11 +33,15 @@ pub fn show(ui: &mut Ui, session: &Session, marked: &[usize], search: &mut Strin
     let listed = Listed {
         session,
         document,
-        marked,
+        marked: &view.marked.parts,
     };
     let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
     let details = session.selected.filter(|&p| p < document.model.parts.len());
-    let room = if details.is_some() { 188.0 } else { 0.0 };
+    let room = if details.is_some() {
+        188.0 + fields.height(ui)
+    } else {
+        0.0
+    };
     ScrollArea::vertical()
         .id_salt("tree")
         .auto_shrink([false, false])
@@ -48,6 +60,8 @@ pub fn show(ui: &mut Ui, session: &Session, marked: &[usize], search: &mut Strin
     if let Some(part) = details {
         control::divider(ui);
         self::details(ui, session, document, wanted, part);
+        ui.add_space(2.0);
+        motion::show(ui, session, view, fields, wanted, part);
     }
 }
 

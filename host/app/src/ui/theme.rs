@@ -52,6 +52,8 @@ pub struct Palette {
     pub contact: Color32,
     /// Surfaces guided onto each other: distinguishable from `contact` for every kind of colour vision, and hatched in the view.
     pub mates: Color32,
+    /// The x, y and z axes of a part's handles.
+    pub axes: [Color32; 3],
 }
 
 const DARK: Palette = Palette {
@@ -72,6 +74,11 @@ const DARK: Palette = Palette {
     fault_text: Color32::from_rgb(255, 122, 112),
     contact: Color32::from_rgb(255, 112, 72),
     mates: Color32::from_rgb(56, 204, 166),
+    axes: [
+        Color32::from_rgb(236, 104, 98),
+        Color32::from_rgb(120, 196, 108),
+        Color32::from_rgb(112, 162, 245),
+    ],
 };
 
 const LIGHT: Palette = Palette {
@@ -92,6 +99,11 @@ const LIGHT: Palette = Palette {
     fault_text: Color32::from_rgb(176, 26, 22),
     contact: Color32::from_rgb(190, 58, 16),
     mates: Color32::from_rgb(0, 116, 90),
+    axes: [
+        Color32::from_rgb(176, 32, 30),
+        Color32::from_rgb(18, 104, 40),
+        Color32::from_rgb(22, 78, 186),
+    ],
 };
 
 /// Colours of a theme.
@@ -266,6 +278,9 @@ mod tests {
                 ("fault", p.fault_text),
                 ("contact", p.contact),
                 ("mates", p.mates),
+                ("x", p.axes[0]),
+                ("y", p.axes[1]),
+                ("z", p.axes[2]),
             ] {
                 for (on, fill) in [("panel", p.panel), ("card", p.card), ("ground", p.ground)] {
                     let ratio = contrast(ink, fill);

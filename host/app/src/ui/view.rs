@@ -7,7 +7,7 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, cube, fits, gaps, measure, section, theme};
+use super::{control, cube, fits, gaps, handles, measure, section, theme};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
@@ -65,6 +65,9 @@ pub fn show(
     touching(ui, rect, session, view);
     gaps::show(ui, rect, document, view);
     marked(ui, rect, view);
+    if !view.measure.on {
+        handles::show(ui, rect, session, view);
+    }
     triad(ui, rect, view);
     let below = toolbar(ui, rect, session, view);
     let below = section::show(ui, rect, below, session, view);
@@ -80,14 +83,16 @@ pub fn show(
 fn hint(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
     let hint = if view.drags_hand() {
         "Moving the hand · Ctrl turns it"
+    } else if view.handles.over().is_some() {
+        "Drag: move the part · Ctrl: steps, with Shift finer · Esc: take back"
     } else if view.measure.on && session.connection().is_some() {
         "Click: measure · Backspace: clear · D: end measuring · Drag: orbit · Shift or middle: pan · Wheel: zoom"
     } else if view.measure.on {
         "Click: measure · Esc: clear, end · D: end measuring · Drag: orbit · Shift or middle: pan · Wheel: zoom"
     } else if session.is_armed() {
-        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · D: measure · Double click: grab"
+        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · D: measure · Double click: grab · F1: keys"
     } else {
-        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · 1 3 7 0 5: views · D: measure · Double click: frame"
+        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · D: measure · Double click: frame · F1: keys"
     };
     ui.painter().text(
         rect.right_bottom() - Vec2::new(14.0, 12.0),

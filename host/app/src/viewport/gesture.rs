@@ -4,6 +4,7 @@ use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Response, Ui};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use super::camera::{Camera, View};
+use super::handles::Handles;
 use super::measure::Measure;
 use super::pick::{Pick, pick};
 pub use super::screen::on_screen;
@@ -61,6 +62,8 @@ pub struct Viewpoint {
     pub picked: Option<Pick>,
     /// The measuring tool.
     pub measure: Measure,
+    /// Handles of the selected part; none while measuring.
+    pub handles: Handles,
     pub(super) goal: Option<Camera>,
     drag: Option<Drag>,
     /// Document at which the camera looks.
@@ -98,6 +101,8 @@ impl Viewpoint {
     /// Handles all pointer and key input over the view.
     pub fn respond(&mut self, ui: &Ui, response: &Response, session: &mut Session, wanted: &mut Vec<Intent>) {
         let rect = response.rect;
+        let handles_are_shown = !self.measure.on || self.handles.hold().is_some();
+        let on_handle = handles_are_shown && self.handles.respond(ui, response, session, &self.camera);
         let Some(document) = &session.document else { return };
         let extent = document.extent;
         if self.seen != Some(document.generation) {
@@ -122,13 +127,14 @@ impl Viewpoint {
         if self.measure.on {
             let shown = self.section.shown(document);
             self.measure.respond(response, document, shown, &self.camera);
-        } else if response.clicked() {
+        } else if response.clicked() && !on_handle {
             let hit = self.pick(document, rect, response.interact_pointer_pos());
             (self.picked, self.marked) = (hit, Marked::default());
             wanted.push(Intent::Select(hit.map(|h| h.part)));
         }
         if response.double_clicked()
             && !self.measure.on
+            && !on_handle
             && let Some(hit) = self.pick(document, rect, response.interact_pointer_pos())
         {
             let grab = Intent::Grab(hit.part);
@@ -136,6 +142,11 @@ impl Viewpoint {
                 None => wanted.push(grab),
                 Some(_) => self.frame_part(document, hit.part, rect),
             }
+        }
+        if self.handles.hold().is_some() {
+            // The part follows the pointer, so the camera rests.
+            self.goal = None;
+            return;
         }
         self.start_drag(ui, response, session);
         self.go_on_dragging(ui, response, session);

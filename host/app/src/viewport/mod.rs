@@ -3,6 +3,9 @@
 pub mod camera;
 pub mod compose;
 pub mod gesture;
+pub mod gizmo;
+pub mod handles;
+pub mod hold;
 mod kept;
 pub mod measure;
 pub mod outline;
