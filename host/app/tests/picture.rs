@@ -118,8 +118,10 @@ fn parts_drawn(projection: Projection) {
     assert!(renderer.resize(SIZE));
     assert!(!renderer.resize(SIZE), "the same size keeps its texture");
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
-    let mut camera = Camera::default();
-    camera.projection = projection;
+    let mut camera = Camera {
+        projection,
+        ..Camera::default()
+    };
     camera.look(View::Front);
     camera.fit(document.extent, aspect);
     let at = |point: DVec3| {
@@ -201,8 +203,10 @@ fn edges_drawn(projection: Projection) {
     renderer.set_shapes(&document.meshes);
     renderer.resize(SIZE);
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
-    let mut camera = Camera::default();
-    camera.projection = projection;
+    let mut camera = Camera {
+        projection,
+        ..Camera::default()
+    };
     camera.look(View::Front);
     camera.fit(document.extent, aspect);
     // Number of nearly white pixels around a point.
@@ -274,8 +278,10 @@ fn cut_drawn(projection: Projection) {
     renderer.set_shapes(&document.meshes);
     renderer.resize(SIZE);
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
-    let mut camera = Camera::default();
-    camera.projection = projection;
+    let mut camera = Camera {
+        projection,
+        ..Camera::default()
+    };
     camera.look(View::Front);
     camera.fit(document.extent, aspect);
     let plane = CutPlane::new(DVec3::ZERO, -DVec3::Y).expect("a plane");
