@@ -351,8 +351,8 @@ impl Assembly {
         self.free_share_beyond(group, others, motion, step_mm, 0.0, false)
     }
 
-    /// As [`Self::free_share`], by all cores: for a motion that is expected to be free, one at a time. Of a motion that meets several of `others` the first pair
-    /// is stated.
+    /// As [`Self::free_share`], by all cores: for a motion that is expected to be free, because no pair ends early when another one meets. Of several pairs that
+    /// meet, the first is stated.
     pub fn free_share_by_cores(
         &self,
         group: &Moved<'_>,

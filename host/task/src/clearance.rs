@@ -237,8 +237,7 @@ pub fn free_share(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits
 /// Least number of pieces of a body's tree that are swept side by side: most of the work may be in few of them.
 const PIECES: usize = 64;
 
-/// As [`free_share`], to the same bits, by all cores. No piece ends early because another one meets something: for motions that are expected to be free,
-/// one at a time.
+/// As [`free_share`], to the same bits, by all cores: for a motion that is expected to be free, because no piece ends early when another one meets something.
 pub fn free_share_by_cores(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits) -> f64 {
     let mut pieces = Vec::new();
     for way in WAYS {

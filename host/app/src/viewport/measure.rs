@@ -9,7 +9,7 @@ use mortise_inspect::measure::{About, Comparison, Entity, Feature, Placed, compa
 
 use super::camera::Camera;
 use super::outline::{Outline, outline};
-use super::snap::{Sight, Snap, Wanted};
+use super::snap::{Snap, SnapView, Wanted};
 use crate::cut::Shown;
 use crate::session::clearances::Search;
 use crate::session::document::Document;
@@ -102,7 +102,7 @@ impl Measure {
         cut: Option<Shown<'_>>,
         camera: &Camera,
     ) {
-        let sight = Sight {
+        let sight = SnapView {
             document,
             cut,
             camera,

@@ -40,7 +40,7 @@ pub enum Wanted {
 
 /// The view in which a feature is looked for.
 #[derive(Clone, Copy)]
-pub struct Sight<'a> {
+pub struct SnapView<'a> {
     /// What is shown.
     pub document: &'a Document,
     /// The section, where there is one.
@@ -69,7 +69,7 @@ struct Near {
     away: f32,
 }
 
-impl Sight<'_> {
+impl SnapView<'_> {
     /// The feature at a place on the screen.
     pub fn snap(&self, at: Pos2, wanted: Wanted) -> Option<Snap> {
         let hit = self.under(at);
