@@ -14,6 +14,8 @@ pub const MAX_PAIRS: usize = 12;
 pub const MAX_TARGETS: usize = 8;
 /// Face pairs of a constraint target.
 pub const MAX_TARGET_PAIRS: usize = 8;
+/// Largest rate of a path's turn with its travel, rad/m: a pitch of 0.63 mm.
+pub const MAX_PATH_RATE: f32 = 1e4;
 /// Keyframes of the simulated operator's script.
 pub const MAX_KEYFRAMES: usize = 12;
 /// Ticks in a message of recorded inputs.

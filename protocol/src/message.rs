@@ -20,7 +20,7 @@ use crate::limits::*;
 use crate::parameter::ParameterId;
 use crate::rig::{Rig, RigFault};
 
-pub use self::constraint::{ConstraintKind, ConstraintTarget, Feature};
+pub use self::constraint::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
 pub use self::fault::Fault;
 pub use self::flags::{FlagRow, Flags};
 pub use self::inputs::{DriverReport, Inputs, TickInput};

@@ -56,6 +56,7 @@ fn the_page_has_the_limits_of_the_code() {
         ("MAX_PAIRS", limits::MAX_PAIRS),
         ("MAX_TARGETS", limits::MAX_TARGETS),
         ("MAX_TARGET_PAIRS", limits::MAX_TARGET_PAIRS),
+        ("MAX_PATH_RATE", limits::MAX_PATH_RATE as usize),
         ("MAX_KEYFRAMES", limits::MAX_KEYFRAMES),
         ("MAX_INPUT_FAULTS", limits::MAX_INPUT_FAULTS),
         ("MAX_LOG", limits::MAX_LOG),

@@ -52,6 +52,7 @@ fn target() -> ConstraintTarget {
         force_cap: 3.0,
         torque_cap: 0.1,
         expiry_ticks: 100,
+        path: None,
         faces: heapless::Vec::new(),
     }
 }

@@ -4,9 +4,9 @@ mod support;
 
 use mortise_haptics::{Flags, GuidanceMethod, Output, Quat, Settings, State, TargetError, Vec3, Wrench};
 use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::{ConstraintTarget, Feature};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
 use support::hand::{Hand, Seen, run};
-use support::{BLOCK_HALF, CAP_N, PEG_HALF, axis_on_axis};
+use support::{BLOCK_HALF, CAP_N, PEG_HALF, along, axis_on_axis, straight};
 
 const PEG: u16 = 1;
 
@@ -289,6 +289,39 @@ fn stale_damaged_and_too_many_targets_change_nothing() {
             ..axis_on_axis(9, 10)
         },
         axis_on_axis(9, 0),
+        // A path without its orientation, an orientation without a path, and paths of numbers out of range.
+        ConstraintTarget {
+            kind: ConstraintKind::Path,
+            ..axis_on_axis(9, 10)
+        },
+        ConstraintTarget {
+            kind: ConstraintKind::Concentric,
+            ..along(9, 10, straight())
+        },
+        along(
+            9,
+            10,
+            Path {
+                orientation: [0.0, 0.0, 0.0, 1.1],
+                ..straight()
+            },
+        ),
+        along(
+            9,
+            10,
+            Path {
+                turn: PathTurn::Geared(f32::NAN),
+                ..straight()
+            },
+        ),
+        along(
+            9,
+            10,
+            Path {
+                turn: PathTurn::Geared(1.1e4),
+                ..straight()
+            },
+        ),
     ];
     for target in bad {
         assert_eq!(

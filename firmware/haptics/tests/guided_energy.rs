@@ -19,7 +19,7 @@ use glam::{DQuat, DVec3};
 use mortise_haptics::observer::{Observer, Place, Rise};
 use mortise_haptics::{GuidanceMethod, Quat, Settings, State, Vec3, Wrench, tick};
 use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
 use proptest::prelude::*;
 use support::hand::Hand;
 use support::image::Image;
@@ -152,6 +152,19 @@ fn place(hand: &Hand) -> Place {
     }
 }
 
+/// A way with the orientation of the part at the start: free to turn, straight, or a screw with a pitch of 3 mm.
+fn path(number: u16) -> Path {
+    Path {
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        turn: match number % 3 {
+            0 => PathTurn::Free,
+            1 => PathTurn::Geared(0.0),
+            _ => PathTurn::Geared(2094.4),
+        },
+        ends: number.is_multiple_of(2),
+    }
+}
+
 fn beside(sequence: u16, off: Vec3, direction: Vec3) -> ConstraintTarget {
     ConstraintTarget {
         fixed: Feature {
@@ -207,6 +220,7 @@ fn many_turning_targets_do_no_work_on_a_resting_hand() {
             let target = ConstraintTarget {
                 id: k,
                 kind: kinds[usize::from(i + k) % kinds.len()],
+                path: (kinds[usize::from(i + k) % kinds.len()] == ConstraintKind::Path).then(|| path(k)),
                 force_cap: 10.0,
                 ..beside(i + 1, 0.05 * direction(3 * k + i), direction(k + i))
             };

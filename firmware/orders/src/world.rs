@@ -528,6 +528,7 @@ fn target(sequence: u16) -> ConstraintTarget {
         force_cap: 1.0,
         torque_cap: 0.01,
         expiry_ticks: 200,
+        path: None,
         faces: Default::default(),
     }
 }

@@ -150,7 +150,8 @@ pub fn find(model: &CadModel, moving: usize, against: usize, options: &FitOption
             path.corners_mm
                 .iter_mut()
                 .for_each(|corner| *corner = turn * *corner);
-            if let Some((point, _)) = &mut path.screw {
+            let screw = path.screw.iter_mut().map(|(point, _)| point);
+            for point in screw.chain(&mut path.spin) {
                 *point = b.placement.transform_point3(*point);
             }
         }

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use mortise_brep::Surface;
 
-use nalgebra::Vector6;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
 use crate::gaps::Pair;
 use crate::mobility::Cone;
@@ -41,6 +41,53 @@ pub struct Path {
     pub corners_mm: Vec<DVec3>,
     /// Point on a screw's axis, mm, and its pitch, mm a turn, positive for a right-hand thread.
     pub screw: Option<(DVec3, f64)>,
+    /// Point on the axis along `direction` about which the mating faces leave the part free to turn, mm; `None` where they do not.
+    pub spin: Option<DVec3>,
+    /// Whether the mating faces hold the part along the way once it is in.
+    pub ends: bool,
+    /// Pairs of mating faces, of the moving part and of the other, that slide along each other on the last straight line, the largest area first.
+    pub sliding: Vec<[u32; 2]>,
+}
+
+impl Path {
+    /// A way of this kind, of which what the mating faces leave free is not known yet.
+    fn new(kind: PathKind, direction: DVec3, length_mm: f64, smallest_clearance_mm: f64) -> Self {
+        Self {
+            kind,
+            direction,
+            length_mm,
+            smallest_clearance_mm,
+            corners_mm: Vec::new(),
+            screw: None,
+            spin: None,
+            ends: true,
+            sliding: Vec::new(),
+        }
+    }
+
+    /// Takes from the mating faces what they leave free, and which of them slide.
+    fn learn(&mut self, fit: &Refined) {
+        if self.kind == PathKind::Screw {
+            return;
+        }
+        let d = self.direction;
+        self.spin = spin(fit, d);
+        self.ends = !leaves_slide(fit, d);
+        let mut pairs: Vec<([u32; 2], f64, bool)> = Vec::new();
+        for gap in &fit.mating {
+            let slides = gap.away.dot(d).abs() < ALONG_WALL;
+            match pairs.iter_mut().find(|(faces, ..)| *faces == gap.faces) {
+                Some((_, area, all)) => {
+                    *area += gap.area;
+                    *all &= slides;
+                }
+                None => pairs.push((gap.faces, gap.area, slides)),
+            }
+        }
+        pairs.retain(|(.., all)| *all);
+        pairs.sort_by(|a, b| b.1.total_cmp(&a.1));
+        self.sliding = pairs.into_iter().map(|(faces, ..)| faces).collect();
+    }
 }
 
 /// Steps of a straight line, and directions tried.
@@ -51,6 +98,10 @@ const SCREW_STEP: f64 = 0.1;
 const MOST_TURNS: f64 = 12.0;
 /// Clearances within this are equal, mm.
 const SAME_CLEARANCE_MM: f64 = 1e-3;
+/// Cosine between a wall's normal and the way below which the faces slide along each other.
+const ALONG_WALL: f64 = 0.02;
+/// Largest remainder of a motion that counts as free.
+const FREE: f64 = 0.02;
 /// Samples taken at a step: one in so many.
 const STRIDE: usize = 4;
 /// Points measured on the exact surfaces at a step: those nearest by the facets.
@@ -67,20 +118,20 @@ pub(crate) fn way_in(
 ) -> Option<Path> {
     let enough = clearance.min(0.0) - overlap;
     let line = |out: DVec3| -> Option<Path> {
+        let out = along_walls(fit, out);
         let length = apart(pair, &fit.pose, out);
         let smallest = swept(pair, &fit.pose, out, length, enough)?.min(clearance);
-        Some(Path {
-            kind: PathKind::Line,
-            direction: -out,
-            length_mm: length,
-            smallest_clearance_mm: smallest,
-            corners_mm: vec![length * out, DVec3::ZERO],
-            screw: None,
-        })
+        let mut path = Path::new(PathKind::Line, -out, length, smallest);
+        path.corners_mm = vec![length * out, DVec3::ZERO];
+        Some(path)
     };
     let full = |path: &Path| path.smallest_clearance_mm > clearance - SAME_CLEARANCE_MM;
+    let learnt = |mut path: Path| {
+        path.learn(fit);
+        path
+    };
     if let Some(path) = known.iter().filter_map(|&out| line(out)).find(full) {
-        return Some(path);
+        return Some(learnt(path));
     }
     let cone = Cone::new(&fit.mating);
     let directions = cone.candidates(&suggested(pair, fit));
@@ -99,6 +150,7 @@ pub(crate) fn way_in(
     }
     best.or_else(|| screw(pair, fit, clearance, enough))
         .or_else(|| two_lines(pair, fit, &cone, &directions, clearance, enough))
+        .map(learnt)
 }
 
 /// Directions that the geometry suggests: normals and axes of the mating faces, and translations among the free motions.
@@ -138,6 +190,33 @@ fn free_directions(fit: &Refined) -> Vec<DVec3> {
             d.try_normalize()
         })
         .collect()
+}
+
+/// The direction next to `out` that runs along the walls: the one across the normals of all mating faces that nearly are. Normals and axes of faces are
+/// exact, but free-form walls have neither, and a thousandth of a radian is the clearance of a close fit over its length.
+fn along_walls(fit: &Refined, out: DVec3) -> DVec3 {
+    let mut sum = Matrix3::<f64>::zeros();
+    for gap in fit
+        .mating
+        .iter()
+        .filter(|gap| gap.away.dot(out).abs() < ALONG_WALL)
+    {
+        let n = Vector3::new(gap.away.x, gap.away.y, gap.away.z);
+        sum += gap.area * n * n.transpose();
+    }
+    let eigen = sum.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let v = eigen.eigenvectors.column(order[0]);
+    let v = DVec3::new(v[0], v[1], v[2]);
+    let along = v * v.dot(out).signum();
+    // Walls across one direction alone leave the other open.
+    let is_sure = eigen.eigenvalues[order[1]] > 0.01 * eigen.eigenvalues[order[2]];
+    if is_sure && along.distance(out) < ALONG_WALL {
+        along
+    } else {
+        out
+    }
 }
 
 /// Travel along `out` after which the boxes of the samples are apart, mm.
@@ -195,14 +274,10 @@ fn two_lines(
                 let Some(before) = swept(pair, &fit.pose, first, slide, enough) else {
                     continue;
                 };
-                return Some(Path {
-                    kind: PathKind::Polyline,
-                    direction: -first,
-                    length_mm: slide + rest,
-                    smallest_clearance_mm: then.min(before).min(clearance),
-                    corners_mm: vec![slide * first + rest * second, slide * first, DVec3::ZERO],
-                    screw: None,
-                });
+                let smallest = then.min(before).min(clearance);
+                let mut path = Path::new(PathKind::Polyline, -first, slide + rest, smallest);
+                path.corners_mm = vec![slide * first + rest * second, slide * first, DVec3::ZERO];
+                return Some(path);
             }
         }
     }
@@ -256,12 +331,44 @@ fn along_screw(
             return None;
         }
     }
-    Some(Path {
-        kind: PathKind::Screw,
-        direction: -out,
-        length_mm: length,
-        smallest_clearance_mm: smallest,
-        corners_mm: Vec::new(),
-        screw: Some((point, pitch)),
-    })
+    let mut path = Path::new(PathKind::Screw, -out, length, smallest);
+    path.screw = Some((point, pitch));
+    Some(path)
+}
+
+/// Combination of the free motions that comes nearest to the motion whose first entries, by `rows` of the twists, are `wanted`: the twist (ω·L, v) and
+/// what remains.
+fn nearest_free(
+    fit: &Refined,
+    rows: impl Fn(&Vector6<f64>) -> [f64; 4],
+    wanted: [f64; 4],
+) -> Option<(Vector6<f64>, f64)> {
+    if fit.free.is_empty() {
+        return None;
+    }
+    let columns: Vec<[f64; 4]> = fit.free.iter().map(rows).collect();
+    let matrix = DMatrix::from_fn(4, columns.len(), |i, j| columns[j][i]);
+    let wanted = DVector::from_column_slice(&wanted);
+    let shares = matrix.clone().svd(true, true).solve(&wanted, 1e-6).ok()?;
+    let remainder = (&matrix * &shares - wanted).norm();
+    let twist = (fit.free.iter().zip(shares.iter()))
+        .fold(Vector6::zeros(), |sum, (twist, share)| sum + twist * *share);
+    Some((twist, remainder))
+}
+
+/// Point on the axis along `d` about which the mating faces leave the part free to turn.
+fn spin(fit: &Refined, d: DVec3) -> Option<DVec3> {
+    let rows = |t: &Vector6<f64>| [t[0], t[1], t[2], d.dot(DVec3::new(t[3], t[4], t[5]))];
+    let (twist, remainder) = nearest_free(fit, rows, [d.x, d.y, d.z, 0.0])?;
+    let shift = DVec3::new(twist[3], twist[4], twist[5]);
+    // ω = d/L: the axis passes at ω × v/|ω|² from the centre.
+    (remainder < FREE).then(|| fit.center + fit.length * d.cross(shift))
+}
+
+/// Whether the mating faces leave a slide along `d`.
+fn leaves_slide(fit: &Refined, d: DVec3) -> bool {
+    // A slide alone: no turn, and the way across the direction is none either, which the length of the twist shows.
+    let rows = |t: &Vector6<f64>| [t[0], t[1], t[2], d.dot(DVec3::new(t[3], t[4], t[5]))];
+    nearest_free(fit, rows, [0.0, 0.0, 0.0, 1.0])
+        .is_some_and(|(twist, remainder)| remainder < FREE && twist.norm() < 1.0 + FREE)
 }

@@ -5,12 +5,16 @@
 //! the rim of its hole touches the top with its end. A part that guidance holds off the walls touches nothing; while its surface is still
 //! in or at the other one, it counts as near and stays guided.
 //!
+//! A fit of whole shapes that the operator chose (see [`Guide::follow`]) is a target like these while the part is near its way: it guides parts of any
+//! form, with no recognised surface.
+//!
 //! Planes that face each other are not sent: they meet by contact (`docs/notes/stop-planes.md`). Cost: that of the recogniser, once per
 //! telemetry message; with [`When::Near`] also a distance for each pair of surfaces that could mate.
 
 mod nearby;
 mod row;
 mod settings;
+mod way;
 mod wire;
 
 use std::collections::BTreeMap;
@@ -27,6 +31,7 @@ use mortise_protocol::message::{ConstraintKind, Telemetry, ToDevice};
 use nearby::Nearby;
 pub use row::{List, Row, Standing};
 pub use settings::{GuideSettings, When};
+pub use way::along;
 
 /// Largest number of targets sent at a time: half of what a board holds, so that fading targets leave space for new ones.
 pub const MAX_SENT: usize = MAX_TARGETS / 2;
@@ -48,6 +53,8 @@ pub struct Guide<'a> {
     held: Option<usize>,
     /// All targets that the held part could ever satisfy, computed on first use.
     possible: Option<(usize, Vec<Target>)>,
+    /// Fits of whole shapes that are followed.
+    fits: Vec<Target>,
     sent: BTreeMap<TargetId, Sent>,
     tick: u32,
     ids: u16,
@@ -74,6 +81,7 @@ impl<'a> Guide<'a> {
             settings,
             held: None,
             possible: None,
+            fits: Vec::new(),
             sent: BTreeMap::new(),
             tick: 0,
             ids: 0,
@@ -92,6 +100,16 @@ impl<'a> Guide<'a> {
         for sent in self.sent.values_mut() {
             sent.due = self.tick;
         }
+    }
+
+    /// Follows these fits of whole shapes, made by [`along`], from the next sample on, and no others; one for a pair of parts.
+    pub fn follow(&mut self, fits: Vec<Target>) {
+        for (id, sent) in &mut self.sent {
+            if id.surfaces.is_none() {
+                sent.due = self.tick;
+            }
+        }
+        self.fits = fits;
     }
 
     /// Resets every part to its pose in the model.
@@ -132,6 +150,7 @@ impl<'a> Guide<'a> {
             moving_part,
             poses: &self.poses,
             touching: &touching,
+            fits: &self.near_fits(moving_part),
         });
         self.messages()
     }
@@ -152,7 +171,8 @@ impl<'a> Guide<'a> {
                 ConstraintKind::Concentric
                 | ConstraintKind::Conical
                 | ConstraintKind::Annular
-                | ConstraintKind::AnnularBore => Some(self.inside(&entry.target)).filter(|x| x.is_finite()),
+                | ConstraintKind::AnnularBore
+                | ConstraintKind::Path => Some(self.inside(&entry.target)).filter(|x| x.is_finite()),
                 ConstraintKind::Coplanar | ConstraintKind::Spherical => None,
             },
             pinned: entry.pinned,
@@ -189,6 +209,7 @@ impl<'a> Guide<'a> {
             State::Off => Standing::Off,
             State::Far => Standing::Candidate,
             State::Conflict(with) => Standing::Conflict(with.clone()),
+            State::Redundant => Standing::Redundant,
             State::Active if !wire::is_sent(entry.target.kind) => Standing::ByContact,
             State::Active => match self.sent.get(&entry.target.id) {
                 None => Standing::Waiting,
@@ -235,7 +256,8 @@ impl<'a> Guide<'a> {
             When::Touching => self.settings.near_mm,
             When::Near => self.settings.near_mm.min(-self.settings.approach_mm),
         };
-        (self.recogniser.active().filter(|t| self.inside(t) > limit))
+        let of_surfaces = self.recogniser.active().filter(|t| t.way.is_none());
+        (of_surfaces.filter(|t| self.inside(t) > limit))
             .filter_map(faces_of)
             .collect()
     }
@@ -265,6 +287,24 @@ impl<'a> Guide<'a> {
         targets.filter(near).filter_map(faces_of).collect()
     }
 
+    /// Followed fits of the held part that are aligned, and whose faces are at most [`GuideSettings::approach_mm`] apart along the way. Whether one engages
+    /// is decided with the thresholds for entering; here those for leaving count.
+    fn near_fits(&self, moving_part: usize) -> Vec<Target> {
+        let limits = self.recogniser.thresholds();
+        let near = |target: &&Target| {
+            let id = target.id;
+            let (Some(at), Some(fixed)) = (self.poses.get(moving_part), self.poses.get(id.fixed_part)) else {
+                return false;
+            };
+            let error = target.alignment_error(at, fixed);
+            id.moving_part == moving_part
+                && error.distance_mm <= limits.release * (limits.distance_mm + target.play_mm.max(0.0))
+                && error.angle_rad <= limits.release * limits.angle_rad
+                && self.inside(target) > -self.settings.approach_mm
+        };
+        self.fits.iter().filter(near).cloned().collect()
+    }
+
     /// Overlap of a target's surfaces along its axis, mm; negative: gap.
     fn inside(&self, target: &Target) -> f64 {
         let (a, b) = (target.id.moving_part, target.id.fixed_part);
@@ -280,7 +320,7 @@ impl<'a> Guide<'a> {
         let mut active: Vec<&Entry> = (self.recogniser.entries())
             .filter(|e| e.state == State::Active && wire::is_sent(e.target.kind))
             .collect();
-        active.sort_by_key(|entry| !entry.pinned);
+        active.sort_by_key(|entry| (!entry.pinned, entry.target.way.is_some()));
         active.truncate(if self.settings.sending { MAX_SENT } else { 0 });
         let mut out = Vec::new();
         self.sent.retain(|id, sent| {

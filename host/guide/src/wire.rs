@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use heapless::Vec as BoundedVec;
-use mortise_mating::recognise::Target;
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
+use mortise_mating::recognise::{Target, Turn};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
 
 use crate::GuideSettings;
 
@@ -29,11 +29,17 @@ pub fn message(
         direction: direction.normalize().as_vec3().to_array(),
     };
     let mut faces = BoundedVec::new();
-    for &moving in &target.moving_faces {
-        for &fixed in &target.fixed_faces {
-            if let (Ok(moving), Ok(fixed)) = (u16::try_from(moving), u16::try_from(fixed)) {
-                // The first few faces are the largest of the surface; contact with the others stays enabled.
-                let _ = faces.push((moving, fixed));
+    let mut add = |moving: u32, fixed: u32| {
+        if let (Ok(moving), Ok(fixed)) = (u16::try_from(moving), u16::try_from(fixed)) {
+            // The first few faces are the largest of the surface; contact with the others stays enabled.
+            let _ = faces.push((moving, fixed));
+        }
+    };
+    match &target.way {
+        Some(way) => way.sliding.iter().for_each(|&[moving, fixed]| add(moving, fixed)),
+        None => {
+            for &moving in &target.moving_faces {
+                target.fixed_faces.iter().for_each(|&fixed| add(moving, fixed));
             }
         }
     }
@@ -48,6 +54,14 @@ pub fn message(
         force_cap: settings.force_cap_n,
         torque_cap: settings.torque_cap_nm,
         expiry_ticks: settings.expiry_ticks,
+        path: target.way.as_ref().map(|way| Path {
+            orientation: way.orientation.as_quat().normalize().to_array(),
+            turn: match way.turn {
+                Turn::Free => PathTurn::Free,
+                Turn::Geared(rad_per_mm) => PathTurn::Geared((1e3 * rad_per_mm) as f32),
+            },
+            ends: way.ends,
+        }),
         faces,
     })
 }

@@ -58,6 +58,7 @@ fn new(model: &CadModel) -> Recogniser<'_> {
 
 fn see(recogniser: &mut Recogniser<'_>, poses: &[DAffine3], touching: &[TouchingFaces]) {
     recogniser.update(&Observation {
+        fits: &[],
         moving_part: 1,
         poses,
         touching,

@@ -45,6 +45,8 @@ constraint_kinds! {
         Annular = "annular",
         /// Axis on centre: cylinder of the grabbed part over a sphere of the other. Leaves a slide and three rotations.
         AnnularBore = "annular",
+        /// Along the way on which two parts of any shape fit: axis on axis, and the orientation of the fit, see [`Path`]. Leaves a slide, or a screw.
+        Path = "path",
     }
 }
 
@@ -55,6 +57,26 @@ pub struct Feature {
     pub point: [f32; 3],
     /// Unit vector, shape frame.
     pub direction: [f32; 3],
+}
+
+/// What a target of kind [`ConstraintKind::Path`] holds beside its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Path {
+    /// Orientation of the grabbed part in the other part's frame where the points of both features meet: a unit quaternion x, y, z, w.
+    pub orientation: [f32; 4],
+    /// Rotation about the axis.
+    pub turn: PathTurn,
+    /// Whether the way ends where the points meet: beyond it the target holds the part back.
+    pub ends: bool,
+}
+
+/// Rotation about the axis of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum PathTurn {
+    /// Free, as of a round part.
+    Free,
+    /// In proportion to the travel along the axis, rad/m: 0 on a straight way, 2π over the pitch on a screw, positive for a right-hand thread.
+    Geared(f32),
 }
 
 /// A constraint recognised by the desktop program, towards which the board guides.
@@ -80,6 +102,8 @@ pub struct ConstraintTarget {
     pub torque_cap: f32,
     /// The target fades out unless refreshed within this many ticks.
     pub expiry_ticks: u16,
+    /// Orientation, rotation and end of a path; `None` for all other kinds.
+    pub path: Option<Path>,
     /// Moving and static faces whose contact the target replaces.
     pub faces: Vec<(u16, u16), MAX_TARGET_PAIRS>,
 }

@@ -262,6 +262,14 @@ impl Random {
             force_cap: self.f32(),
             torque_cap: self.f32(),
             expiry_ticks: self.u16(),
+            path: self.bool().then(|| Path {
+                orientation: self.floats(),
+                turn: match self.bool() {
+                    true => PathTurn::Free,
+                    false => PathTurn::Geared(self.f32()),
+                },
+                ends: self.bool(),
+            }),
             faces: self.list(|r| (r.u16(), r.u16())),
         }
     }

@@ -11,23 +11,32 @@
 //! | spherical | all | free |
 //! | annular | across the fixed axis | free |
 //! | annular, bore moving | across the moving axis | free |
+//! | path | across the fixed axis; beyond its end also along it | parallel in the same sense, and the turn about them, if it is not free |
 //!
 //! For planes only the angle is guided: contact keeps the distance and attracts no part, and an attracting plane could hold a part up in the air.
 //!
 //! Each component is a row J of the step's scaled twist (v, ω·L) and an error e: e' = e + h·J·V'. The offset is taken between the moving point and
-//! the fixed feature, the angle as the sine of that between the directions.
+//! the fixed feature, the angle as the sine of that between the directions. A path with a given turn has the whole rotation E from the goal's orientation
+//! to the part's as its angle, 2·vec E; on a screw the goal's orientation turns by c·s over the travel s, which adds −c·∂s to the row about the axis. That
+//! row is divided by √(1 + (c·L)²): the torque's cap then bounds the force that the screw makes of it, too.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use heapless::Vec;
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, PathTurn};
 
 use crate::math::pose::Pose;
+use crate::math::rotation::exp;
 use crate::math::symmetric6::dot;
 
-/// Components of the alignment error that must vanish: Jacobian rows and errors (m; for directions rad·L).
+/// A Jacobian row, and the error (m; for directions rad·L).
+pub(crate) type Row = ([f32; 6], f32);
+
+/// Components of the alignment error that must vanish.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
-    pub rows: Vec<([f32; 6], f32), 3>,
+    pub rows: Vec<Row, 3>,
+    /// Component that counts only while it is positive: the travel beyond a path's end.
+    pub end: Option<Row>,
 }
 
 /// Alignment error of a target at one placement.
@@ -53,22 +62,47 @@ impl Alignment {
         let turning = across(Vec3::from_array(target.moving.direction));
         let turning = [turning.0, turning.1].map(|n| object.transform_vector(n));
         let (directions, arm): (&[Vec3], Vec3) = match target.kind {
-            ConstraintKind::Concentric | ConstraintKind::Annular => (&[u, v], arm),
+            ConstraintKind::Concentric | ConstraintKind::Annular | ConstraintKind::Path => (&[u, v], arm),
             // d(n·from) = n·v + (n·(ω × arm) + (ω × n)·from): the lever ends at the fixed point.
             ConstraintKind::AnnularBore => (&turning, arm - from),
             ConstraintKind::Coplanar => (&[], arm),
             ConstraintKind::Conical | ConstraintKind::Spherical => (&[u, v, axis], arm),
         };
         for n in directions {
-            let turn = arm.cross(*n) * (1.0 / length);
-            offset.add([n.x, n.y, n.z, turn.x, turn.y, turn.z], n.dot(from));
+            offset.add(slide(*n, arm, length), n.dot(from));
         }
         let mut angle = Rows::default();
-        if matches!(
-            target.kind,
-            ConstraintKind::Concentric | ConstraintKind::Coplanar | ConstraintKind::Conical
-        ) {
-            let aligned = if direction.dot(axis) < 0.0 { -axis } else { axis };
+        let mut one_sense = false;
+        if let Some(path) = &target.path {
+            if path.ends {
+                offset.end = Some((slide(axis, arm, length), axis.dot(from)));
+            }
+            match path.turn {
+                PathTurn::Free => one_sense = true,
+                PathTurn::Geared(rate) => {
+                    let travel = axis.dot(from);
+                    let goal =
+                        turned(axis, rate * travel) * fixed.orientation * Quat::from_array(path.orientation);
+                    let error = rotation_between(goal, object.orientation) * length;
+                    for n in [u, v] {
+                        angle.add([0.0, 0.0, 0.0, n.x, n.y, n.z], n.dot(error));
+                    }
+                    let coupled = slide(axis, arm, length).map(|x| -rate * length * x);
+                    let share = 1.0 / libm::sqrtf(1.0 + (rate * length) * (rate * length));
+                    let [x, y, z, a, b, c] = coupled;
+                    let row = [x, y, z, a + axis.x, b + axis.y, c + axis.z];
+                    angle.add(row.map(|x| share * x), share * axis.dot(error));
+                }
+            }
+        }
+        let by_directions = match target.kind {
+            ConstraintKind::Concentric | ConstraintKind::Coplanar | ConstraintKind::Conical => true,
+            ConstraintKind::Path => one_sense,
+            ConstraintKind::Spherical | ConstraintKind::Annular | ConstraintKind::AnnularBore => false,
+        };
+        if by_directions {
+            let opposed = !one_sense && direction.dot(axis) < 0.0;
+            let aligned = if opposed { -axis } else { axis };
             let turn = direction.cross(aligned);
             for n in [u, v] {
                 // A turn by ω closes the angle: its rate is −n·ω.
@@ -92,9 +126,20 @@ impl Rows {
 
     /// Its square.
     pub fn error2(&self, x: &[f32; 6], ahead: f32) -> f32 {
-        (self.rows.iter())
+        let two_sided = (self.rows.iter())
             .map(|(row, error)| error + ahead * dot(row, x))
-            .fold(0.0, |sum, e| sum + e * e)
+            .fold(0.0, |sum, e| sum + e * e);
+        let beyond = self.beyond_end(x, ahead);
+        two_sided + beyond * beyond
+    }
+
+    /// Travel beyond the end after the twist `x` has acted for `ahead` s, m; 0 before it.
+    pub fn beyond_end(&self, x: &[f32; 6], ahead: f32) -> f32 {
+        let Some((row, error)) = &self.end else {
+            return 0.0;
+        };
+        let beyond = error + ahead * dot(row, x);
+        if beyond > 0.0 { beyond } else { 0.0 }
     }
 
     /// Length of the error's rate under the twist `x`.
@@ -104,6 +149,25 @@ impl Rows {
             .fold(0.0, |sum, v| sum + v * v);
         libm::sqrtf(squared)
     }
+}
+
+/// Row of the travel along `n` of a point at `arm` from the centre of mass; `length` is L.
+fn slide(n: Vec3, arm: Vec3, length: f32) -> [f32; 6] {
+    let turn = arm.cross(n) * (1.0 / length);
+    [n.x, n.y, n.z, turn.x, turn.y, turn.z]
+}
+
+/// Rotation by `angle` rad about a unit vector.
+fn turned(axis: Vec3, angle: f32) -> Quat {
+    use core::f32::consts::TAU;
+    exp(axis * (angle - TAU * libm::rintf(angle / TAU)))
+}
+
+/// Rotation from one orientation to another, 2·sin(θ/2) about its axis in the world's frame, θ at most π.
+fn rotation_between(from: Quat, to: Quat) -> Vec3 {
+    let by = to * from.conjugate();
+    let double = if by.w < 0.0 { -2.0 } else { 2.0 };
+    Vec3::new(by.x, by.y, by.z) * double
 }
 
 /// Two unit vectors across a unit vector and each other.
@@ -126,7 +190,7 @@ fn across(axis: Vec3) -> (Vec3, Vec3) {
 mod tests {
     use super::*;
     use glam::Quat;
-    use mortise_protocol::message::Feature;
+    use mortise_protocol::message::{Feature, Path};
 
     fn target(kind: ConstraintKind) -> ConstraintTarget {
         ConstraintTarget {
@@ -146,6 +210,7 @@ mod tests {
             force_cap: 3.0,
             torque_cap: 0.1,
             expiry_ticks: 100,
+            path: None,
             faces: Vec::new(),
         }
     }
@@ -167,8 +232,30 @@ mod tests {
         let center = Vec3::new(0.11, 0.19, -0.09);
         let body = Vec3::new(0.002, 0.001, 0.003);
         let pose = |center: Vec3, q: Quat| Pose::new(center - q * body, q);
-        for kind in ConstraintKind::ALL {
-            let t = target(kind);
+        // Of a path: where the part would be oriented as it nearly is, after the turn over its travel.
+        let turns = [PathTurn::Free, PathTurn::Geared(0.0), PathTurn::Geared(-300.0)];
+        let paths = turns.map(|turn| (ConstraintKind::Path, Some(turn)));
+        let others = ConstraintKind::ALL.map(|kind| (kind, None));
+        let others = others
+            .into_iter()
+            .filter(|(kind, _)| *kind != ConstraintKind::Path);
+        for (kind, turn) in others.chain(paths) {
+            let mut t = target(kind);
+            t.path = turn.map(|turn| {
+                let on_axis = pose(center, orientation).transform_point(Vec3::from_array(t.moving.point));
+                let travel = axis.dot(on_axis - fixed.transform_point(Vec3::from_array(t.fixed.point)));
+                let turned = match turn {
+                    PathTurn::Free => Quat::IDENTITY,
+                    PathTurn::Geared(rate) => Quat::from_axis_angle(axis.normalize(), -rate * travel),
+                };
+                let goal = Quat::from_rotation_x(2e-3) * turned * orientation;
+                Path {
+                    orientation: (fixed.orientation.conjugate() * goal).normalize().to_array(),
+                    turn,
+                    ends: true,
+                }
+            });
+            assert_eq!(t.path.is_some(), kind == ConstraintKind::Path);
             let here = Alignment::of(&t, &pose(center, orientation), center, &fixed, length);
             for unknown in 0..6 {
                 let step = 1e-4;
@@ -179,7 +266,8 @@ mod tests {
                     Quat::from_scaled_axis(Vec3::new(x[3], x[4], x[5]) * (1.0 / length)) * orientation;
                 let there = Alignment::of(&t, &pose(moved, turned), moved, &fixed, length);
                 for (a, b) in [(&here.offset, &there.offset), (&here.angle, &there.angle)] {
-                    for ((row, before), (_, after)) in a.rows.iter().zip(&b.rows) {
+                    let pairs = a.rows.iter().zip(&b.rows).chain(a.end.iter().zip(&b.end));
+                    for ((row, before), (_, after)) in pairs {
                         let found = (after - before) / step;
                         assert!(
                             (found - row[unknown]).abs() < 0.01,

@@ -57,7 +57,7 @@ fn mate(kind: ConstraintKind, moving: &FaceRecord, fixed: &FaceRecord) -> bool {
         ConstraintKind::Spherical => kinds == (SPHERE, SPHERE),
         ConstraintKind::Annular => kinds == (SPHERE, CYLINDER),
         ConstraintKind::AnnularBore => kinds == (CYLINDER, SPHERE),
-        ConstraintKind::Conical | ConstraintKind::Coplanar => false,
+        ConstraintKind::Conical | ConstraintKind::Coplanar | ConstraintKind::Path => false,
     };
     round && moving.sense * fixed.sense < 0.0
 }

@@ -48,6 +48,8 @@ struct Secant {
     /// |u| and its rate at that solution, m and m/s.
     reach: f32,
     speed: f32,
+    /// Travel beyond the end of the rows at that solution, m: the spring acts along it only while it is positive.
+    beyond: f32,
 }
 
 impl Secant {
@@ -55,7 +57,13 @@ impl Secant {
     fn is_near(&self, other: &Self, force_n: f32) -> bool {
         let spring = (self.spring - other.spring).abs() * other.reach;
         let damper = (self.damper - other.damper).abs() * other.speed;
-        spring + damper <= force_n
+        let switched = (self.beyond > 0.0) != (other.beyond > 0.0);
+        let end = if switched {
+            other.spring * (self.beyond + other.beyond)
+        } else {
+            0.0
+        };
+        spring + damper + end <= force_n
     }
 }
 
@@ -105,6 +113,7 @@ impl SaturatingSpring {
                 secant.spring = saturating(stiffness, cap, squared);
             }
         }
+        secant.beyond = self.rows.beyond_end(x, self.ahead());
         if self.damper_n > 0.0 {
             secant.speed = self.rows.speed(x);
             secant.damper = saturating(RELEASE_DAMPING, self.damper_n, secant.speed * secant.speed);
@@ -119,6 +128,12 @@ impl SaturatingSpring {
         for (r, a) in system.right.iter_mut().zip(&self.along) {
             *r -= impulse * a;
         }
+        if let Some((row, error)) = self.rows.end.as_ref().filter(|_| secant.beyond > 0.0) {
+            system.matrix.add_outer(impulse * self.ahead(), row);
+            for (r, j) in system.right.iter_mut().zip(row) {
+                *r -= impulse * error * j;
+            }
+        }
     }
 
     fn ahead(&self) -> f32 {
@@ -131,11 +146,17 @@ impl SaturatingSpring {
     pub fn wrench(&self, x: &[f32; 6], length: f32) -> Wrench {
         let secant = self.secant(x);
         let mut wrench = Wrench::ZERO;
+        let mut push = |row: &[f32; 6], f: f32| {
+            wrench.force += Vec3::new(row[0], row[1], row[2]) * f;
+            wrench.torque += Vec3::new(row[3], row[4], row[5]) * (f * length);
+        };
         for (row, error) in &self.rows.rows {
             let rate = dot(row, x);
             let f = -secant.spring * (error + self.ahead() * rate) - secant.damper * rate;
-            wrench.force += Vec3::new(row[0], row[1], row[2]) * f;
-            wrench.torque += Vec3::new(row[3], row[4], row[5]) * (f * length);
+            push(row, f);
+        }
+        if let Some((row, _)) = &self.rows.end {
+            push(row, -secant.spring * secant.beyond);
         }
         wrench
     }
@@ -246,9 +267,11 @@ mod tests {
             x in contract::twists(),
             v in contract::twists(),
             along in 0usize..6,
+            end in prop::option::of(-2e-3f32..2e-3),
         ) {
             let mut rows = Rows::default();
             let [a, b, c] = turn;
+            rows.end = end.map(|error| ([0.0, 0.0, 1.0, b, c, a], error));
             let _ = rows.rows.push(([1.0, 0.0, 0.0, a, b, c], errors[0]));
             let _ = rows.rows.push(([0.0, 1.0, 0.0, c, a, b], errors[1]));
             let ahead = 0.021;

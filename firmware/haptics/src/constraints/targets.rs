@@ -27,8 +27,8 @@
 use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::image::SceneImage;
-use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget};
+use mortise_protocol::limits::{MAX_PATH_RATE, MAX_TARGETS};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Path, PathTurn};
 
 use crate::collision::placement::Placed;
 use crate::collision::rules::{ExcludedPairs, FacePairRules, Mating, holds};
@@ -428,7 +428,13 @@ impl Slot {
 
     /// Engagement of the torque and of the allowance, which may grow faster than that of the force: a part that is aligned first enters the bore, one
     /// that reaches the axis first rests on the rim.
+    ///
+    /// A screw makes a force of its torque, so that both engage alike.
     fn torque_engagement(&self) -> f32 {
+        let screw = |path: &Path| matches!(path.turn, PathTurn::Geared(rate) if rate != 0.0);
+        if self.target.path.as_ref().is_some_and(screw) {
+            return self.engagement;
+        }
         (self.engagement * self.torque_step() / self.step()).min(1.0)
     }
 
@@ -503,6 +509,7 @@ fn same_constraint(a: &ConstraintTarget, b: &ConstraintTarget) -> bool {
         && a.stiffness == b.stiffness
         && a.force_cap == b.force_cap
         && a.torque_cap == b.torque_cap
+        && a.path == b.path
         && a.faces == b.faces
 }
 
@@ -511,7 +518,20 @@ fn check(target: &ConstraintTarget) -> Result<(), TargetError> {
     let unit = |d: [f32; 3]| (Vec3::from_array(d).length_squared() - 1.0).abs() < 1e-3;
     let near = |p: [f32; 3]| p.iter().all(|x| x.abs() < 100.0);
     let within = |x: f32, max: f32| (0.0..=max).contains(&x);
-    let good = unit(target.moving.direction)
+    let path = match &target.path {
+        None => target.kind != ConstraintKind::Path,
+        Some(path) => {
+            let q = path.orientation;
+            let squared = q.iter().fold(0.0, |sum, x| sum + x * x);
+            let rate = match path.turn {
+                PathTurn::Free => 0.0,
+                PathTurn::Geared(rate) => rate,
+            };
+            target.kind == ConstraintKind::Path && (squared - 1.0).abs() < 1e-3 && rate.abs() <= MAX_PATH_RATE
+        }
+    };
+    let good = path
+        && unit(target.moving.direction)
         && unit(target.fixed.direction)
         && near(target.moving.point)
         && near(target.fixed.point)

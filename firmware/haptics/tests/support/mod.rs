@@ -6,7 +6,7 @@ pub mod image;
 pub mod solids;
 
 use image::{Image, Writer};
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
 use solids::{Block, Peg};
 
 pub const UPRIGHT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
@@ -113,7 +113,32 @@ pub fn axis_on_axis(sequence: u16, expiry_ticks: u16) -> ConstraintTarget {
         force_cap: CAP_N,
         torque_cap: 0.1,
         expiry_ticks,
+        path: None,
         // The peg's side, the hole.
         faces: heapless::Vec::from_slice(&[(0, 3)]).unwrap(),
+    }
+}
+
+/// A straight way: the part keeps the orientation of the scene, and there is no end.
+pub fn straight() -> Path {
+    Path {
+        orientation: UPRIGHT,
+        turn: PathTurn::Geared(0.0),
+        ends: false,
+    }
+}
+
+/// The target of [`axis_on_axis`] as a way down into the hole, of kind `Path`.
+pub fn along(sequence: u16, expiry_ticks: u16, path: Path) -> ConstraintTarget {
+    let down = Feature {
+        point: [0.0; 3],
+        direction: [0.0, 0.0, -1.0],
+    };
+    ConstraintTarget {
+        kind: ConstraintKind::Path,
+        moving: down,
+        fixed: down,
+        path: Some(path),
+        ..axis_on_axis(sequence, expiry_ticks)
     }
 }

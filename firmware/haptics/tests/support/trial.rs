@@ -13,7 +13,7 @@ use mortise_haptics::observer::{Observer, Place};
 use mortise_haptics::{GuidanceMethod, Input, Settings, State, Twist, Vec3, Wrench, tick};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
 
 /// Integration steps per tick.
 const SUBSTEPS: u32 = 10;
@@ -418,7 +418,8 @@ fn target(random: &mut Random, object: &Place, sequence: u16, ids: u64) -> Const
     let off = random.direction() * random.decade(1e-5, 0.1);
     let tilt = random.direction() * random.decade(1e-3, 3.1);
     let fixed_point = object.orientation * point + object.position + off;
-    let fixed_direction = DQuat::from_scaled_axis(tilt) * (object.orientation * direction);
+    let turned = DQuat::from_scaled_axis(tilt) * object.orientation;
+    let fixed_direction = turned * direction;
     let mut faces = heapless::Vec::new();
     if random.chance(0.5) {
         let _ = faces.push((0, 3));
@@ -450,6 +451,15 @@ fn target(random: &mut Random, object: &Place, sequence: u16, ids: u64) -> Const
             1 => 1 + random.below(20) as u16,
             _ => 1 + random.below(600) as u16,
         },
+        path: (kind == ConstraintKind::Path).then(|| Path {
+            orientation: turned.normalize().as_quat().to_array(),
+            turn: match random.below(3) {
+                0 => PathTurn::Free,
+                1 => PathTurn::Geared(0.0),
+                _ => PathTurn::Geared((random.within(-1.0, 1.0) * random.decade(1.0, 1e4)) as f32),
+            },
+            ends: random.chance(0.5),
+        }),
         faces,
     }
 }

@@ -96,6 +96,11 @@ struct PathReport {
     corners_mm: Vec<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     screw: Option<ScrewReport>,
+    /// Point on the axis along the direction about which the part can turn freely.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turns_about_mm: Option<[f64; 3]>,
+    /// Whether the mating faces hold the part at the end of the way.
+    ends: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -171,6 +176,8 @@ fn path_report(path: &Path) -> PathReport {
             point_mm: point.to_array(),
             pitch_mm,
         }),
+        turns_about_mm: path.spin.map(|point| point.to_array()),
+        ends: path.ends,
     }
 }
 

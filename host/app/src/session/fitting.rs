@@ -293,6 +293,9 @@ mod tests {
                 smallest_clearance_mm: 0.0,
                 corners_mm: vec![-30.0 * direction, DVec3::ZERO],
                 screw: None,
+                spin: None,
+                ends: true,
+                sliding: Vec::new(),
             }),
         }
     }

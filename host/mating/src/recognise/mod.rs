@@ -5,7 +5,8 @@
 //! distance and angle within the thresholds. All near candidates are solved together; one that contradicts earlier ones
 //! waits and names them. Thresholds are looser for leaving than for entering, and a target is retained for some updates
 //! without touch, so that the list does not flicker. The operator may pin an entry (it stays while it can be satisfied) or
-//! switch it off.
+//! switch it off. A fit of two whole shapes, which others found, is a candidate like these; it comes after those of surfaces,
+//! and engages only where it holds more than they do.
 //!
 //! The list after an update is a function of the previous list, the observation and the operator's choices: it depends on
 //! no clock and no random numbers.
@@ -19,7 +20,7 @@ use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
 
 pub use solve::{Freedom, Solution};
-pub use target::{AlignmentError, Target, TargetId};
+pub use target::{AlignmentError, Target, TargetId, Turn, Way};
 
 use crate::merge::{MergedSurface, merge};
 use crate::tolerances::Tolerances;
@@ -82,6 +83,8 @@ pub struct Observation<'a> {
     pub poses: &'a [DAffine3],
     /// Faces that touch, or are near enough to count as touching.
     pub touching: &'a [TouchingFaces],
+    /// Fits of the held part as a whole with others that are near enough to engage.
+    pub fits: &'a [Target],
 }
 
 /// State of an entry.
@@ -93,6 +96,8 @@ pub enum State {
     Far,
     /// Contradicts these targets, which came first.
     Conflict(Vec<TargetId>),
+    /// A fit of whole shapes that holds nothing which recognised surfaces do not hold.
+    Redundant,
     /// Switched off by the operator.
     Off,
 }
@@ -166,13 +171,14 @@ impl<'a> Recogniser<'a> {
             entry.idle = entry.idle.saturating_add(1);
             entry.depth_mm = 0.0;
         }
-        for touch in seen.touching {
-            let Some(target) = self.candidate(seen.moving_part, touch) else {
-                continue;
-            };
+        let by_surfaces: Vec<(Target, f64)> = (seen.touching.iter())
+            .filter_map(|touch| Some((self.candidate(seen.moving_part, touch)?, touch.depth_mm)))
+            .collect();
+        let of_shapes = seen.fits.iter().map(|target| (target.clone(), 0.0));
+        for (target, depth_mm) in by_surfaces.into_iter().chain(of_shapes) {
             let Choice { pinned, off } = self.choices.get(&target.id).copied().unwrap_or_default();
-            let entry = self.entries.entry(target.id).or_insert(Entry {
-                target,
+            let entry = self.entries.entry(target.id).or_insert_with(|| Entry {
+                target: target.clone(),
                 state: State::Far,
                 alignment_error: AlignmentError {
                     distance_mm: 0.0,
@@ -183,8 +189,12 @@ impl<'a> Recogniser<'a> {
                 off,
                 idle: 0,
             });
+            // Another fit of the same two parts takes its place.
+            if entry.target.way != target.way {
+                entry.target = target;
+            }
             entry.idle = 0;
-            entry.depth_mm = entry.depth_mm.max(touch.depth_mm);
+            entry.depth_mm = entry.depth_mm.max(depth_mm);
         }
         let patience = self.thresholds.patience;
         self.entries.retain(|id, e| {
@@ -254,12 +264,14 @@ impl<'a> Recogniser<'a> {
             for (moving_surface, fixed_surface) in
                 (0..a.merged.len()).flat_map(|i| (0..fixed).map(move |j| (i, j)))
             {
-                out.extend(self.between(TargetId {
-                    moving_part,
-                    moving_surface,
-                    fixed_part,
-                    fixed_surface,
-                }));
+                out.extend(self.between(
+                    TargetId {
+                        moving_part,
+                        fixed_part,
+                        surfaces: Some([moving_surface, fixed_surface]),
+                    },
+                    [moving_surface, fixed_surface],
+                ));
             }
         }
         out
@@ -276,27 +288,31 @@ impl<'a> Recogniser<'a> {
             let surfaces = self.surfaces.get(self.model.parts.get(part)?.shape)?;
             *surfaces.of_face.get(face as usize)?
         };
-        self.between(TargetId {
+        let surfaces = [
+            surface_of(moving_part, touch.moving_face)?,
+            surface_of(touch.fixed_part, touch.fixed_face)?,
+        ];
+        let id = TargetId {
             moving_part,
-            moving_surface: surface_of(moving_part, touch.moving_face)?,
             fixed_part: touch.fixed_part,
-            fixed_surface: surface_of(touch.fixed_part, touch.fixed_face)?,
-        })
+            surfaces: Some(surfaces),
+        };
+        self.between(id, surfaces)
     }
 
-    fn between(&self, id: TargetId) -> Option<Target> {
+    fn between(&self, id: TargetId, [moving_surface, fixed_surface]: [usize; 2]) -> Option<Target> {
         let of = |part: usize| self.surfaces.get(self.model.parts.get(part)?.shape);
         let (a, b) = (of(id.moving_part)?, of(id.fixed_part)?);
-        let (moving, fixed) = (a.merged.get(id.moving_surface)?, b.merged.get(id.fixed_surface)?);
-        let target = Target::between(id, moving, fixed, *a.middles.get(id.moving_surface)?)?;
+        let (moving, fixed) = (a.merged.get(moving_surface)?, b.merged.get(fixed_surface)?);
+        let target = Target::between(id, moving, fixed, *a.middles.get(moving_surface)?)?;
         let larger = 2.0 * (target.radius_mm + target.play_mm.max(0.0));
         let most = (self.thresholds.diameter_share * larger).max(self.thresholds.diameter_mm);
         let sizes = -self.thresholds.interference_mm..=most;
         (sizes.contains(&(2.0 * target.play_mm)) && id.moving_part != id.fixed_part).then_some(target)
     }
 
-    /// Activates targets one by one while they can be satisfied together: pinned ones first, then those active before, then
-    /// the ones with the smallest alignment error.
+    /// Activates targets one by one while they can be satisfied together: pinned ones first, then those of surfaces before those of whole shapes, then
+    /// those active before, then the ones with the smallest alignment error.
     fn decide(&mut self, seen: &Observation<'_>) {
         let limits = self.thresholds;
         let Some(pose) = seen.poses.get(seen.moving_part) else {
@@ -323,16 +339,16 @@ impl<'a> Recogniser<'a> {
                 (false, true) => {
                     let off = entry.alignment_error.distance_mm / distance_mm
                         + entry.alignment_error.angle_rad / limits.angle_rad;
-                    order.push((!entry.pinned, !was_active, off, *id));
+                    order.push((!entry.pinned, id.surfaces.is_none(), !was_active, off, *id));
                     State::Conflict(Vec::new())
                 }
             };
         }
         order.sort_by(|a, b| {
-            (a.0, a.1)
-                .cmp(&(b.0, b.1))
-                .then(a.2.total_cmp(&b.2))
-                .then(a.3.cmp(&b.3))
+            (a.0, a.1, a.2)
+                .cmp(&(b.0, b.1, b.2))
+                .then(a.3.total_cmp(&b.3))
+                .then(a.4.cmp(&b.4))
         });
         let mut kept: Vec<TargetId> = Vec::new();
         let mut freedom = solve(&[], pose, size).freedom;
@@ -349,6 +365,9 @@ impl<'a> Recogniser<'a> {
                 fits.then_some(solution)
             };
             let state = match together(&kept) {
+                Some(solution) if id.surfaces.is_none() && solution.freedom.count() == freedom.count() => {
+                    State::Redundant
+                }
                 Some(solution) => {
                     freedom = solution.freedom;
                     kept.push(id);

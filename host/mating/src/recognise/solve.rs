@@ -14,7 +14,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use mortise_protocol::message::ConstraintKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::target::{AlignmentError, Target, placed};
+use super::target::{AlignmentError, Target, Turn, placed, rotation};
 use crate::contact::Axis;
 
 /// Singular values below this fraction of the largest count as zero: 1 mm over a part of 1 m.
@@ -142,10 +142,30 @@ fn rows(targets: &[Placed<'_>], pose: &DAffine3, center: DVec3, size: f64) -> (D
             let x = z.any_orthonormal_vector();
             [x, z.cross(x)]
         };
+        let travel = (a.origin - b.origin).dot(b.direction);
+        // Of a way with a given turn: the rotation that is asked for, and its rate with the travel, rad/mm.
+        let mut whole: Option<(DVec3, f64)> = None;
         let turned = match target.kind {
             ConstraintKind::Concentric => {
                 across(b.direction).into_iter().for_each(&mut slide);
                 Some(b.direction * a.direction.dot(b.direction).signum())
+            }
+            ConstraintKind::Path => {
+                across(b.direction).into_iter().for_each(&mut slide);
+                match &target.way {
+                    Some(way) if way.turn != Turn::Free => {
+                        let goal = way.goal(rotation(fixed), b.direction, travel);
+                        let by = (goal * rotation(pose).inverse()).normalize();
+                        let by = if by.w < 0.0 { -by } else { by };
+                        let rate = match way.turn {
+                            Turn::Free => 0.0,
+                            Turn::Geared(rate) => rate,
+                        };
+                        whole = Some((by.to_scaled_axis(), rate));
+                        None
+                    }
+                    _ => Some(b.direction),
+                }
             }
             ConstraintKind::Coplanar => {
                 slide(b.direction);
@@ -172,6 +192,20 @@ fn rows(targets: &[Placed<'_>], pose: &DAffine3, center: DVec3, size: f64) -> (D
             for e in across(goal) {
                 rows.push([0.0, 0.0, 0.0, e.x, e.y, e.z]);
                 asked.push(by.dot(e) * size);
+            }
+        }
+        if let Some((by, rate)) = whole {
+            let [x, y] = across(b.direction);
+            for e in [x, y, b.direction] {
+                rows.push([0.0, 0.0, 0.0, e.x, e.y, e.z]);
+                asked.push(by.dot(e) * size);
+            }
+            // On a screw the turn asked for grows with the travel.
+            let travels = rate * size * b.direction;
+            let turns = rate * (a.origin - center).cross(b.direction);
+            if let Some([vx, vy, vz, wx, wy, wz]) = rows.last_mut() {
+                (*vx, *vy, *vz) = (-travels.x, -travels.y, -travels.z);
+                (*wx, *wy, *wz) = (*wx - turns.x, *wy - turns.y, *wz - turns.z);
             }
         }
     }

@@ -1,40 +1,74 @@
-//! A constraint that two merged surfaces could satisfy, with its geometry in both parts' frames.
+//! A constraint that two merged surfaces, or two whole shapes, could satisfy, with its geometry in both parts' frames.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::Surface;
 use mortise_protocol::message::ConstraintKind;
 
 use crate::contact::Axis;
 use crate::merge::{MergedSurface, Side};
 
-/// Two merged surfaces, one of the moving part and one of a fixed part. Indices into [`crate::merge`] of the parts' shapes.
+/// Two merged surfaces, one of the moving part and one of a fixed part, or the two parts as wholes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TargetId {
     /// The moving part, an index into [`mortise_brep::CadModel::parts`].
     pub moving_part: usize,
-    /// Surface of the moving part.
-    pub moving_surface: usize,
     /// The other part.
     pub fixed_part: usize,
-    /// Surface of the other part.
-    pub fixed_surface: usize,
+    /// Surface of the moving part and of the other, indices into [`crate::merge`] of their shapes; `None`: a fit of the whole shapes.
+    pub surfaces: Option<[usize; 2]>,
 }
 
-/// A constraint that two surfaces could satisfy.
+/// The way on which two shapes of any form fit: of targets of kind [`ConstraintKind::Path`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Way {
+    /// Orientation of the moving part in the other part's frame where both origins meet.
+    pub orientation: DQuat,
+    /// Rotation about the axis.
+    pub turn: Turn,
+    /// Length of the way before the origins meet, mm.
+    pub length_mm: f64,
+    /// Whether it ends where the origins meet.
+    pub ends: bool,
+    /// Faces of both parts that slide along each other, in pairs: the target accounts for contact between these.
+    pub sliding: Vec<[u32; 2]>,
+}
+
+/// Rotation about the axis of a way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Turn {
+    /// Free.
+    Free,
+    /// In proportion to the travel, rad/mm, positive for a right-hand thread; 0: none.
+    Geared(f64),
+}
+
+impl Way {
+    /// Orientation of the moving part in the assembly that the way asks for after a travel along `axis` (mm; negative before the end), with the other
+    /// part turned by `fixed`.
+    pub(crate) fn goal(&self, fixed: DQuat, axis: DVec3, travel_mm: f64) -> DQuat {
+        let rate = match self.turn {
+            Turn::Free => 0.0,
+            Turn::Geared(rate) => rate,
+        };
+        DQuat::from_axis_angle(axis.normalize(), rate * travel_mm) * fixed * self.orientation
+    }
+}
+
+/// A constraint that two surfaces or shapes could satisfy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// The surfaces.
     pub id: TargetId,
     /// The kind of constraint.
     pub kind: ConstraintKind,
-    /// Axis, outward normal, centre (with arbitrary direction), or axis of a cone in the direction of its widening: in the
-    /// moving part's frame. Where the surface does not determine the origin, it is in the middle of the moving surface.
+    /// Axis, outward normal, centre (with arbitrary direction), axis of a cone in the direction of its widening, or of a way in the direction in which
+    /// the part goes in: in the moving part's frame. Where the surface does not determine the origin, it is in the middle of the moving surface.
     pub moving: Axis,
     /// The corresponding axis of the fixed surface, in the fixed part's frame.
     pub fixed: Axis,
-    /// Radius of the hole minus that of the inner surface, mm: the play to either side. 0 for planes and cones.
+    /// Radius of the hole minus that of the inner surface, mm: the play to either side. Of a way its smallest clearance; 0 for planes and cones.
     pub play_mm: f64,
-    /// Radius of the inner surface, mm; 0 for planes and cones.
+    /// Radius of the inner surface, mm; 0 for planes, cones and ways.
     pub radius_mm: f64,
     /// Whether the inner surface (shaft, cone, ball) belongs to the moving part; `false` for planes.
     pub inner_moves: bool,
@@ -42,6 +76,8 @@ pub struct Target {
     pub moving_faces: Vec<u32>,
     /// Face ids of the fixed part.
     pub fixed_faces: Vec<u32>,
+    /// Of a fit of whole shapes.
+    pub way: Option<Way>,
 }
 
 /// Alignment error of a target. The letters are those of the notation page.
@@ -154,6 +190,7 @@ impl Target {
             inner_moves: in_bore > 0.0,
             moving_faces: moving.faces.clone(),
             fixed_faces: fixed.faces.clone(),
+            way: None,
         })
     }
 
@@ -171,6 +208,16 @@ impl Target {
             ConstraintKind::Annular | ConstraintKind::AnnularBore => {
                 (between.reject_from(self.bore(&a, &b)).length(), 0.0)
             }
+            ConstraintKind::Path => {
+                let angle = match &self.way {
+                    Some(way) if way.turn != Turn::Free => {
+                        let goal = way.goal(rotation(fixed), b.direction, between.dot(b.direction));
+                        goal.angle_between(rotation(moving))
+                    }
+                    _ => lines.atan2(cos),
+                };
+                (between.reject_from(b.direction).length(), angle)
+            }
         };
         AlignmentError {
             distance_mm,
@@ -185,6 +232,11 @@ impl Target {
             _ => b.direction,
         }
     }
+}
+
+/// Rotation of a placement.
+pub(crate) fn rotation(at: &DAffine3) -> DQuat {
+    DQuat::from_mat3(&at.matrix3).normalize()
 }
 
 /// An axis transformed by its part's placement.
