@@ -135,9 +135,8 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     open_sample(&mut harness);
     let unknown = TargetId {
         moving_part: 7,
-        moving_surface: 99,
         fixed_part: 8,
-        fixed_surface: 99,
+        surfaces: Some([99, 99]),
     };
     let session = &harness.state().session;
     for intent in [
@@ -208,6 +207,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
                 inner_moves: true,
                 moving_faces: vec![],
                 fixed_faces: vec![u32::MAX],
+                way: None,
             },
             standing,
             alignment_error: AlignmentError {

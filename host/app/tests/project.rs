@@ -160,9 +160,8 @@ fn what_was_done_comes_back_when_the_model_s_file_has_changed() {
     change(&mut harness.state_mut().session);
     let fit = TargetId {
         moving_part: 1,
-        moving_surface: 0,
         fixed_part: 0,
-        fixed_surface: 0,
+        surfaces: Some([0, 0]),
     };
     let off = FitChoice {
         pinned: false,

@@ -2,13 +2,11 @@
 //!
 //! `MORTISE_FIT_PAIRS` sets how many pairs are tried.
 
-mod support;
-
 use std::io::Write as _;
 use std::time::Instant;
 
 use mortise_fit::{Fit, FitOptions, find};
-use support::pairs::{Designed, KINDS};
+use mortise_shapes::{Designed, KINDS};
 
 #[test]
 fn designed_poses_are_found() {

@@ -141,10 +141,13 @@ impl<'a> Guide<'a> {
         if let Some(place) = self.poses.get_mut(moving_part) {
             *place = DAffine3::from_rotation_translation(orientation, position);
         }
-        let mut touching = self.touched(moving_part, sample);
-        touching.extend(self.kept());
-        if self.settings.when == When::Near {
-            touching.extend(self.approached(moving_part));
+        let mut touching = Vec::new();
+        if self.settings.recognising {
+            touching.extend(self.touched(moving_part, sample));
+            touching.extend(self.kept());
+            if self.settings.when == When::Near {
+                touching.extend(self.approached(moving_part));
+            }
         }
         self.recogniser.update(&Observation {
             moving_part,

@@ -28,6 +28,8 @@ impl When {
 pub struct GuideSettings {
     /// Whether targets are sent; they are recognised in any case.
     pub sending: bool,
+    /// Whether mating surfaces are recognised; fits that are followed guide in any case.
+    pub recognising: bool,
     /// Condition under which a target may engage.
     pub when: When,
     /// k_g, N/m.
@@ -49,6 +51,7 @@ impl Default for GuideSettings {
     fn default() -> Self {
         Self {
             sending: true,
+            recognising: true,
             when: When::default(),
             stiffness_n_per_m: 1e6,
             force_cap_n: 3.0,

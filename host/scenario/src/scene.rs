@@ -76,7 +76,16 @@ impl PreparedScene {
         Self::bake(&scenario.scene.step, model, &scenario.scene.part, options)
     }
 
-    fn bake(step: &Path, model: CadModel, part: &str, options: &BakeOptions) -> Result<Self, ScenarioError> {
+    /// Bakes and samples a model that was read before, and perhaps rearranged; `step` names it in errors, `part` is the one to grab.
+    ///
+    /// # Errors
+    /// `Bake`, `NoSuchPart`.
+    pub fn bake(
+        step: &Path,
+        model: CadModel,
+        part: &str,
+        options: &BakeOptions,
+    ) -> Result<Self, ScenarioError> {
         let name = || step.display().to_string();
         if !model.parts.iter().any(|known| known.name == part) {
             let known: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();

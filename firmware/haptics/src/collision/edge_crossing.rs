@@ -21,8 +21,9 @@ pub const LEAST_SINE: f32 = 0.005;
 const LEAST_SINE_OF_CURVES: f32 = 0.1;
 /// Sine of the angle by which a normal may lie outside of a cone: rounding, and the change of a face's normal along a piece.
 const CONE_SINE: f32 = 0.02;
-/// How far past its ends a piece still counts, as a share of its half length: consecutive pieces leave no gap.
-const PAST_END: f32 = 0.01;
+/// How far past its ends a piece still counts, m: consecutive pieces leave no gap. Less than the clearance of any fit: at the corner of a hole the edges
+/// of a plug's end, prolonged by the clearance, cross those of the hole's rim.
+const PAST_END_M: f32 = 2e-6;
 /// Distance between the feet across the normal, m, beyond which the steps have not converged: rounding at the flattest angle is a fifth of it.
 const BESIDE_M: f32 = 10e-6;
 /// Steps to the common perpendicular of curved pieces: the first starts from tangents at most 0.2 rad off, each later one squares the error.
@@ -248,7 +249,8 @@ pub(crate) fn crossing(
             return None;
         }
     }
-    if t.abs() > 1.0 + PAST_END || s.abs() > 1.0 + PAST_END {
+    let past_end = |t: f32, piece: &Piece<'_>| (t.abs() - 1.0) * piece.record.radius > PAST_END_M;
+    if past_end(t, own) || past_end(s, other) {
         return None;
     }
     let (d, e) = (own.tangent(t), other.tangent(s));
@@ -288,6 +290,7 @@ mod tests {
             half,
             bend,
             normals: normals.map(oct_encode),
+            radius: Vec3::from_array(half).length() + Vec3::from_array(bend).length(),
             ..EdgeRecord::default()
         }
     }
@@ -336,6 +339,49 @@ mod tests {
             [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
         );
         assert!(crossing(&beside, &other).is_none());
+    }
+
+    /// The end of a plug over the corner of its hole, held in its middle: the plug's edge, prolonged by the clearance, crosses the rim, but it ends before.
+    #[test]
+    fn edges_that_end_before_a_corner_do_not_cross_there() {
+        for clearance in [5e-6f32, 38e-6, 0.1e-3] {
+            for length in [5e-3f32, 20e-3, 0.2] {
+                let half = 0.5 * length;
+                let own = edge(
+                    [-clearance - half, -clearance, 1e-6],
+                    [half, 0.0, 0.0],
+                    [0.0; 3],
+                    [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+                );
+                let rim = edge(
+                    [0.0, -half, 0.0],
+                    [0.0, half, 0.0],
+                    [0.0; 3],
+                    [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]],
+                );
+                assert!(crossing(&own, &rim).is_none(), "{clearance} {length}");
+            }
+        }
+    }
+
+    /// Two pieces of one edge that meet leave no place at which another edge passes between them.
+    #[test]
+    fn pieces_that_meet_leave_no_gap() {
+        let faces = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+        let pieces = [-0.03f32, 0.01].map(|x| edge([x, 0.0, 1e-6], [0.02, 0.0, 0.0], [0.0; 3], faces));
+        for step in -50..=50 {
+            let x = -0.01 + 1e-8 * step as f32;
+            let other = edge(
+                [x, 0.0, 0.0],
+                [0.0, 0.02, 0.0],
+                [0.0; 3],
+                [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+            );
+            assert!(
+                pieces.iter().any(|piece| crossing(piece, &other).is_some()),
+                "{x}"
+            );
+        }
     }
 
     /// Rims in one plane, one outside of the other, do not touch, however near they are.

@@ -44,11 +44,13 @@ pub fn capture(session: &Session, document: &Document) -> Project {
         .iter()
         .filter(|(_, choice)| choice.pinned || choice.off);
     let fits = fits.filter_map(|(id, choice)| {
+        // A fit of whole shapes is found again.
+        let [moving_surface, fixed_surface] = id.surfaces?;
         Some(KeptFit {
             moving: document.names.get(id.moving_part)?.clone(),
-            moving_surface: id.moving_surface,
+            moving_surface,
             fixed: document.names.get(id.fixed_part)?.clone(),
-            fixed_surface: id.fixed_surface,
+            fixed_surface,
             pinned: choice.pinned,
             off: choice.off,
         })
@@ -118,9 +120,8 @@ pub fn apply(session: &mut Session, project: &Project, source: &Source) {
     let fits = project.fits.iter().filter(|_| same).filter_map(|fit| {
         let id = TargetId {
             moving_part: *numbers.get(&fit.moving)?,
-            moving_surface: fit.moving_surface,
             fixed_part: *numbers.get(&fit.fixed)?,
-            fixed_surface: fit.fixed_surface,
+            surfaces: Some([fit.moving_surface, fit.fixed_surface]),
         };
         let choice = FitChoice {
             pinned: fit.pinned,

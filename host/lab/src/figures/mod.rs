@@ -5,6 +5,7 @@ mod claims;
 mod constraints;
 mod contact;
 mod end_to_end;
+mod guidance;
 mod link;
 mod parts;
 mod plan;
@@ -26,6 +27,7 @@ const TABLES: &[(&str, Measure)] = &[
     ("end-to-end", end_to_end::measure),
     ("contact", contact::measure),
     ("constraints", constraints::measure),
+    ("guidance", guidance::measure),
     ("stability", stability::measure),
     ("promises", promises::measure),
     ("plan", planning::measure),

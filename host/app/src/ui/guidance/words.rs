@@ -1,8 +1,10 @@
 //! Targets in words: the surfaces, the alignment error, the status, and the remaining motion.
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 use mortise_guide::{List, MAX_SENT, Row, Standing};
-use mortise_mating::recognise::{Freedom, Target, TargetId};
+use mortise_mating::recognise::{Freedom, Target, TargetId, Turn};
 use mortise_protocol::message::ConstraintKind;
 
 use crate::session::document::Document;
@@ -37,6 +39,7 @@ pub fn surfaces(target: &Target) -> String {
             };
         }
         ConstraintKind::Coplanar => return "flat face on flat face".to_owned(),
+        ConstraintKind::Path => return way(target),
     };
     let what_goes_in = 2.0 * (target.radius_mm - target.play_mm.min(0.0));
     let inner = format!("{inner} Ø {what_goes_in:.3}");
@@ -52,6 +55,22 @@ pub fn surfaces(target: &Target) -> String {
     }
 }
 
+/// Length and motion of a way in, and its clearance.
+fn way(target: &Target) -> String {
+    let Some(way) = &target.way else {
+        return "way in".to_owned();
+    };
+    let motion = match way.turn {
+        Turn::Free => "free to turn".to_owned(),
+        Turn::Geared(rate) if rate.abs() < 1e-9 => "straight".to_owned(),
+        Turn::Geared(rate) => format!("a screw, pitch {:.3} mm", TAU / rate.abs()),
+    };
+    format!(
+        "way in of {:.1} mm, {motion}: {:.3} mm clearance",
+        way.length_mm, target.play_mm
+    )
+}
+
 /// Alignment error of a row, and how far the surfaces are inserted.
 pub fn alignment(row: &Row) -> String {
     let (d, degrees) = (
@@ -64,6 +83,7 @@ pub fn alignment(row: &Row) -> String {
         ConstraintKind::Conical => format!("off by {d:.3} mm, {degrees:.2}°"),
         ConstraintKind::Spherical => format!("centres {d:.3} mm apart"),
         ConstraintKind::Annular | ConstraintKind::AnnularBore => format!("centre {d:.3} mm off the axis"),
+        ConstraintKind::Path => format!("off the way by {d:.3} mm, {degrees:.2}°"),
     };
     match row.inside_mm {
         Some(inside) if inside > 0.0 => text += &format!(", {inside:.1} mm inserted"),
@@ -81,6 +101,7 @@ pub fn standing(document: &Document, list: &List, row: &Row, guides: bool) -> St
             let names: Vec<String> = with.iter().map(|id| named(document, list, *id)).collect();
             format!("Contradicts {}", names.join(" and "))
         }
+        Standing::Redundant => "Held by recognised surfaces".to_owned(),
         Standing::Off => "Switched off".to_owned(),
         Standing::ByContact => "Fits: held by contact".to_owned(),
         Standing::Waiting if guides => format!("Queued: {MAX_SENT} already guide"),
@@ -188,9 +209,8 @@ mod tests {
             target: Target {
                 id: TargetId {
                     moving_part: 1,
-                    moving_surface: 0,
                     fixed_part: 0,
-                    fixed_surface: 0,
+                    surfaces: Some([0, 0]),
                 },
                 kind,
                 moving: axis(DVec3::Z),
@@ -200,6 +220,7 @@ mod tests {
                 inner_moves,
                 moving_faces: vec![3],
                 fixed_faces: (0..9).collect(),
+                way: None,
             },
             standing: Standing::Sent,
             alignment_error: AlignmentError {

@@ -3,12 +3,12 @@
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_haptics::Settings;
 
-use super::parallel::trials;
 use super::two_solids::{HELD, baked, cuboid};
 use crate::LabError;
 use crate::convex::Convex;
 use crate::driven::{HandlePath, Image, Made, drive};
 use crate::figures::{Plan, Row};
+use crate::parallel::trials;
 use crate::separation::signed_distance_mm;
 
 /// Length of the bars, mm, and their widths: square sections.

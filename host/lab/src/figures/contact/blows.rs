@@ -3,12 +3,12 @@
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_haptics::Settings;
 
-use super::parallel::trials;
 use super::two_solids::{HELD, baked, cuboid};
 use crate::LabError;
 use crate::convex::Convex;
 use crate::driven::{HandlePath, Image, drive};
 use crate::figures::{Plan, Row};
+use crate::parallel::trials;
 
 /// Plate: half edges, mm, and thicknesses, mm.
 const PLATE_MM: [f64; 2] = [31.0, 17.0];

@@ -3,10 +3,10 @@
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_scenario::probe::{NamedPose, ProbeRow, ProbeScene, Resolution};
 
-use super::parallel::trials;
 use crate::LabError;
 use crate::convex::Convex;
 use crate::figures::{Plan, Row};
+use crate::parallel::trials;
 use crate::separation::{overlap, signed_distance_mm};
 use crate::step_text::StepText;
 

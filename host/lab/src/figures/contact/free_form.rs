@@ -11,10 +11,10 @@ use mortise_scenario::{Body, ScenarioError};
 use super::convex_pairs::placed;
 use super::errors::Errors;
 use super::limits::ABSENT;
-use super::parallel::trials;
 use crate::corpus::truths::{TrueCase, TruePair, true_pairs};
 use crate::figures::{Plan, Row};
 use crate::least_distance::least_distance_mm;
+use crate::parallel::trials;
 use crate::{LabError, corpus, scene_p};
 
 /// Planned accuracy, mm.

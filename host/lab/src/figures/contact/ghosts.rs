@@ -10,9 +10,9 @@ use mortise_scenario::{Body, ScenarioError};
 
 use super::convex_pairs::{placed, rounded};
 use super::limits::ABSENT;
-use super::parallel::trials;
 use crate::figures::{Plan, Row};
 use crate::least_distance::least_distance_mm;
+use crate::parallel::trials;
 use crate::{LabError, corpus};
 
 /// Distance above which parts are clear of each other, and below whose negative they overlap as designed, mm.

@@ -11,10 +11,10 @@ use mortise_scenario::{PreparedScene, Scenario, ScenarioError};
 
 use super::ghosts::files;
 use super::limits::ABSENT;
-use super::parallel::trials;
 use crate::driven::{HandlePath, Image, drive};
 use crate::figures::{Plan, Row};
 use crate::least_distance::least_distance_mm;
+use crate::parallel::trials;
 use crate::{LabError, corpus};
 
 /// Speeds, mm/s, and the largest overlap at each, mm.

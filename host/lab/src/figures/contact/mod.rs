@@ -12,7 +12,6 @@ mod ghosts;
 mod hands;
 mod insertion;
 mod limits;
-mod parallel;
 mod random_fits;
 mod ticks;
 mod two_solids;

@@ -7,11 +7,11 @@ use mortise_scenario::Body;
 use super::convex_pairs::{placed, rounded};
 use super::errors::Errors;
 use super::free_form::{ask, plan_pair};
-use super::parallel::trials;
 use crate::LabError;
 use crate::corpus::truths::{TrueCase, TruePair};
 use crate::figures::{Plan, Row};
 use crate::least_distance::least_distance_mm;
+use crate::parallel::trials;
 use crate::step_text::{StepText, list};
 
 /// Pairs and poses of each, in the full and in the shorter form.

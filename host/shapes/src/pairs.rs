@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use fastrand::Rng;
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
-use super::step::{Cap, Patch, Side, Solid, Tube, pair};
+use crate::step::{Cap, Patch, Side, Solid, Tube, pair};
 
 /// What the designed pose leaves free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Free {
+    /// Nothing.
     Nothing,
     /// A slide along z.
     SlideZ,
@@ -19,11 +20,13 @@ pub enum Free {
 
 /// A pair whose parts fit at the identity, were they not moved.
 pub struct Designed {
+    /// Name of the kind.
     pub kind: &'static str,
     moving: Solid,
     fixed: Solid,
     /// Displacements of the moving part, beside the identity, at which it fits too.
     pub alternatives: Vec<DAffine3>,
+    /// What the designed pose leaves free.
     pub free: Free,
     /// Points of the mating faces, or of the axis, mm.
     points: Vec<DVec3>,
@@ -33,6 +36,7 @@ pub struct Designed {
     pub within: f64,
     /// How the geometry of the moving and of the fixed part is moved.
     moved: [DAffine3; 2],
+    /// Gap between the mating faces, mm.
     pub clearance: f64,
 }
 

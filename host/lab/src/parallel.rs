@@ -11,7 +11,7 @@ use crate::LabError;
 ///
 /// # Errors
 /// The first trial's that failed.
-pub(super) fn trials<T: Send>(
+pub(crate) fn trials<T: Send>(
     count: usize,
     trial: impl Fn(usize) -> Result<T, LabError> + Sync,
 ) -> Result<Vec<T>, LabError> {

@@ -1,0 +1,242 @@
+//! Insertion of a part of any shape along a way that the fit finder found, by a hand that is off and trembles, with no recognised surface.
+
+use std::path::Path;
+
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_bake::{BakeOptions, Grabbable};
+use mortise_brep::{CadModel, LoadOptions, load_step_with};
+use mortise_fit::{Fit, FitOptions, find, part_named};
+use mortise_guide::{GuideSettings, along};
+use mortise_mating::recognise::Target;
+use mortise_protocol::message::Telemetry;
+use mortise_rig::RigSpec;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{PreparedScene, Recording, Scenario, connect, overlap, record};
+
+use crate::LabError;
+use crate::guided::{key, script};
+
+/// Room between the parts at the start, beyond where they are apart, mm.
+const ROOM_MM: f64 = 4.0;
+/// Distance before the mouth from which the hand is off, mm.
+const BEFORE_MOUTH_MM: f64 = 3.0;
+/// How far beyond the fit the hand pulls, mm.
+const BEYOND_MM: f64 = 2.0;
+/// Speed of the hand along the way, mm/s.
+const SPEED_MM_S: f64 = 25.0;
+/// Ticks after full engagement until a part is on its way: 1 mm decays below 1 µm with τ = 20 ms.
+const SETTLING_TICKS: u32 = 150;
+/// A part that comes so near to the end of its way is in, mm.
+const IN_MM: f64 = 0.1;
+
+/// How far the hand is off at the mouth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Off {
+    /// Sideways, mm, in a direction across the way at this angle, rad.
+    pub aside_mm: f64,
+    pub direction_rad: f64,
+    /// Rotation vector, rad.
+    pub turn: DVec3,
+}
+
+/// How an insertion is helped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Help {
+    /// Contact alone.
+    Nothing,
+    /// The way in, held.
+    Way,
+}
+
+/// A pair, its fit, and the scene in which the moving part begins outside.
+pub(crate) struct Followed {
+    scenario: Scenario,
+    scene: PreparedScene,
+    target: Target,
+    /// Placements of the moving part at the start and in the fit, and of the other part, mm.
+    start: DAffine3,
+    other: DAffine3,
+    /// Direction in which the part goes in, and travel from the mouth to the fit, mm.
+    into: DVec3,
+    depth_mm: f64,
+}
+
+/// What an insertion showed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// Whether the part arrived at the end of its way.
+    pub is_in: bool,
+    /// Time from the start until it did, s; NaN: never.
+    pub after_s: f64,
+    /// Largest distance from the way, mm, and largest angle, rad, once held; NaN: never held.
+    pub off_mm: f64,
+    pub off_rad: f64,
+    /// Largest force at the handle, N.
+    pub peak_n: f64,
+    /// Deepest overlap by the exact surfaces, mm.
+    pub overlap_mm: f64,
+    /// Ticks missed.
+    pub missed: u32,
+}
+
+impl Followed {
+    /// The best fit of parts `moving` and `fixed` of a STEP file that has a way in.
+    pub fn new(step: &Path, [moving, fixed]: [&str; 2]) -> Result<Self, LabError> {
+        let bad = |what: String| LabError::Input {
+            name: step.display().to_string(),
+            what,
+        };
+        let reading = LoadOptions::default();
+        let mut model = load_step_with(step, &reading).map_err(|error| bad(error.to_string()))?;
+        let part = |name: &str| part_named(&model, name).map_err(|error| bad(error.to_string()));
+        let (a, b) = (part(moving)?, part(fixed)?);
+        let found = find(&model, a, b, &FitOptions::default()).map_err(|error| bad(error.to_string()))?;
+        let fit = found
+            .fits
+            .iter()
+            .find_map(|fit| Some((fit, along(&model, a, b, fit)?)));
+        let (fit, target) = fit.ok_or_else(|| bad("no fit with a way in was found".to_owned()))?;
+        let (into, length_mm) = way(fit).ok_or_else(|| bad("the way in has no direction".to_owned()))?;
+        let other = model.parts[b].placement;
+        let start = DAffine3::from_translation(-(length_mm + ROOM_MM) * into) * fit.placement;
+        let depth_mm = mating_depth(&model, [a, b], fit, into);
+        model.parts[a].placement = start;
+        let middle = start.transform_point3(model.shapes[model.parts[a].shape].center_of_mass);
+        let mut scenario = script(step)?;
+        scenario.scene.part = moving.to_owned();
+        scenario.depth = None;
+        scenario.hand.grip_mm = middle.to_array();
+        let options = BakeOptions {
+            grabbable: Grabbable::Named(vec![moving.to_owned()]),
+            ..BakeOptions::default()
+        };
+        let scene = PreparedScene::bake(step, model, moving, &options)?;
+        Ok(Self {
+            scenario,
+            scene,
+            target,
+            start,
+            other,
+            into,
+            depth_mm,
+        })
+    }
+
+    /// Inserts the part.
+    pub fn insert(&self, off: &Off, help: Help, rig: &RigSpec) -> Result<Seen, LabError> {
+        let scenario = self.scenario(off);
+        let settings = GuideSettings {
+            recognising: false,
+            ..GuideSettings::default()
+        };
+        let mut guide = self.scene.guide(settings);
+        if help == Help::Way {
+            guide.follow(vec![self.target.clone()]);
+        }
+        let mut listener = |sample: &Telemetry| guide.hear(sample);
+        let client = connect(&scenario, rig)?;
+        let recording = record(&client, &scenario, &self.scene, Some(&mut listener))?;
+        Ok(self.seen(&recording))
+    }
+
+    /// The hand's motion: to before the mouth, off there, and on along the way.
+    fn scenario(&self, off: &Off) -> Scenario {
+        let mut scenario = self.scenario.clone();
+        let total = self.travel_mm(&self.start).abs();
+        let before = total - self.depth_mm - BEFORE_MOUTH_MM;
+        let (x, y) = self.into.any_orthonormal_pair();
+        let (sin, cos) = off.direction_rad.sin_cos();
+        let aside = off.aside_mm * (cos * x + sin * y);
+        let at = |travel: f64, aside: DVec3| (travel * self.into + aside).to_array();
+        let turn = off.turn.to_array().map(f64::to_degrees);
+        let down_s = (total + BEYOND_MM - before) / SPEED_MM_S;
+        scenario.hand.keyframes = vec![
+            key(0.0, [0.0; 3], [0.0; 3]),
+            key(0.5, at(before, aside), turn),
+            key(0.5 + down_s, at(total + BEYOND_MM, aside), turn),
+        ];
+        scenario.run.duration_s = 1.0 + down_s;
+        scenario
+    }
+
+    /// Travel of the part at a placement, mm: 0 in the fit, negative before it.
+    fn travel_mm(&self, at: &DAffine3) -> f64 {
+        let origin = at.transform_point3(self.target.moving.origin);
+        let end = self.other.transform_point3(self.target.fixed.origin);
+        (origin - end).dot(self.into)
+    }
+
+    fn seen(&self, recording: &Recording) -> Seen {
+        let mut seen = Seen {
+            is_in: false,
+            after_s: f64::NAN,
+            off_mm: f64::NAN,
+            off_rad: f64::NAN,
+            peak_n: recording.outcome.peak_force_n,
+            overlap_mm: overlap::penetration_mm(&self.scene, &recording.samples),
+            missed: recording.outcome.missed_ticks,
+        };
+        let first = recording.samples.first().map_or(0, |sample| sample.tick);
+        let mut held_since = None;
+        for sample in &recording.samples {
+            let Some((_, pose)) = &sample.object else { continue };
+            let at = pose_mm(pose);
+            let is_in = self.travel_mm(&at) > -IN_MM;
+            if is_in && !seen.is_in {
+                seen.is_in = true;
+                seen.after_s = 1e-3 * f64::from(sample.tick - first);
+            }
+            if sample.guidance.engagement < 1.0 {
+                held_since = None;
+            } else if sample.tick - *held_since.get_or_insert(sample.tick) > SETTLING_TICKS {
+                let error = self.target.alignment_error(&at, &self.other);
+                seen.off_mm = seen.off_mm.max(error.distance_mm);
+                seen.off_rad = seen.off_rad.max(error.angle_rad);
+            }
+        }
+        seen
+    }
+}
+
+/// Direction and length of the last straight line of a fit's way in, mm.
+fn way(fit: &Fit) -> Option<(DVec3, f64)> {
+    let path = fit.path.as_ref()?;
+    let length = match path.corners_mm.as_slice() {
+        [.., from, to] => from.distance(*to),
+        _ => path.length_mm,
+    };
+    Some((path.direction.try_normalize()?, length))
+}
+
+/// Extent along the way over which the mating faces of both parts overlap in the fit, mm.
+fn mating_depth(model: &CadModel, parts: [usize; 2], fit: &Fit, into: DVec3) -> f64 {
+    let places = [fit.placement, model.parts[parts[1]].placement];
+    let extent = |side: usize| {
+        let mesh = &model.shapes[model.parts[parts[side]].shape].mesh;
+        let of = |face: &u32| fit.faces.iter().any(|faces| faces[side] == *face);
+        (mesh.triangles.iter().zip(&mesh.triangle_face))
+            .filter(|(_, face)| of(face))
+            .flat_map(|(triangle, _)| triangle)
+            .map(|&vertex| {
+                places[side]
+                    .transform_point3(mesh.vertices[vertex as usize])
+                    .dot(into)
+            })
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x), high.max(x))
+            })
+    };
+    let (a, b) = (extent(0), extent(1));
+    (a.1.min(b.1) - a.0.max(b.0)).max(0.0)
+}
+
+/// A hand that is this far off, in random directions.
+pub(crate) fn off(random: &mut fastrand::Rng, aside_mm: f64, turn_deg: f64) -> Off {
+    let mut signed = || 2.0 * random.f64() - 1.0;
+    let axis = DQuat::from_xyzw(signed(), signed(), signed(), 0.01).normalize() * DVec3::Z;
+    Off {
+        aside_mm,
+        direction_rad: std::f64::consts::PI * signed(),
+        turn: turn_deg.to_radians() * axis,
+    }
+}
