@@ -102,7 +102,8 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// Follows these fits of whole shapes, made by [`along`], from the next sample on, and no others; one for a pair of parts.
+    /// Follows these fits of whole shapes, made by [`along`], from the next sample on, and no others. Where two parts fit in several ways, the one whose
+    /// way is nearest guides.
     pub fn follow(&mut self, fits: Vec<Target>) {
         for (id, sent) in &mut self.sent {
             if id.surfaces.is_none() {
@@ -153,7 +154,7 @@ impl<'a> Guide<'a> {
             moving_part,
             poses: &self.poses,
             touching: &touching,
-            fits: &self.near_fits(moving_part),
+            fits: &self.near_fits(moving_part, sample),
         });
         self.messages()
     }
@@ -204,7 +205,9 @@ impl<'a> Guide<'a> {
         let limits = self.recogniser.thresholds();
         let near = entry.alignment_error.distance_mm <= LISTED * limits.distance_mm
             && entry.alignment_error.angle_rad <= LISTED * limits.angle_rad;
-        near || entry.state != State::Far || entry.pinned
+        // What recognised surfaces hold is listed with them.
+        let redundant = entry.state == State::Redundant && !entry.pinned;
+        !redundant && (near || entry.state != State::Far || entry.pinned)
     }
 
     fn standing(&self, entry: &Entry) -> Standing {
@@ -212,7 +215,8 @@ impl<'a> Guide<'a> {
             State::Off => Standing::Off,
             State::Far => Standing::Candidate,
             State::Conflict(with) => Standing::Conflict(with.clone()),
-            State::Redundant => Standing::Redundant,
+            // Not listed.
+            State::Redundant => Standing::Candidate,
             State::Active if !wire::is_sent(entry.target.kind) => Standing::ByContact,
             State::Active => match self.sent.get(&entry.target.id) {
                 None => Standing::Waiting,
@@ -290,22 +294,46 @@ impl<'a> Guide<'a> {
         targets.filter(near).filter_map(faces_of).collect()
     }
 
-    /// Followed fits of the held part that are aligned, and whose faces are at most [`GuideSettings::approach_mm`] apart along the way. Whether one engages
-    /// is decided with the thresholds for entering; here those for leaving count.
-    fn near_fits(&self, moving_part: usize) -> Vec<Target> {
+    /// Followed fits of the held part that are aligned, and whose faces are in or at each other along the way: for each other part the nearest one, or
+    /// the one that guides now. Whether it engages is decided with the thresholds for entering; here those for leaving count.
+    fn near_fits(&self, moving_part: usize, sample: &Telemetry) -> Vec<Target> {
         let limits = self.recogniser.thresholds();
-        let near = |target: &&Target| {
-            let id = target.id;
-            let (Some(at), Some(fixed)) = (self.poses.get(moving_part), self.poses.get(id.fixed_part)) else {
-                return false;
-            };
-            let error = target.alignment_error(at, fixed);
-            id.moving_part == moving_part
-                && error.distance_mm <= limits.release * (limits.distance_mm + target.play_mm.max(0.0))
-                && error.angle_rad <= limits.release * limits.angle_rad
-                && self.inside(target) > -self.settings.approach_mm
+        let touches = |part: usize| {
+            (sample.pairs.iter()).any(|pair| self.parts.get(usize::from(pair.static_part)) == Some(&part))
         };
-        self.fits.iter().filter(near).cloned().collect()
+        let guides = |target: &Target| self.recogniser.active().any(|active| active == target);
+        let off = |target: &Target| {
+            let (at, fixed) = (
+                self.poses.get(moving_part)?,
+                self.poses.get(target.id.fixed_part)?,
+            );
+            let error = target.alignment_error(at, fixed);
+            let distance = error.distance_mm / (limits.distance_mm + target.play_mm.max(0.0));
+            let angle = error.angle_rad / limits.angle_rad;
+            (distance <= limits.release && angle <= limits.release).then_some(distance + angle)
+        };
+        let mut near: BTreeMap<TargetId, (f64, &Target)> = BTreeMap::new();
+        for target in self
+            .fits
+            .iter()
+            .filter(|target| target.id.moving_part == moving_part)
+        {
+            let guides = guides(target);
+            let farthest = match self.settings.when {
+                When::Near => -self.settings.approach_mm,
+                When::Touching if guides || touches(target.id.fixed_part) => self.settings.near_mm,
+                When::Touching => continue,
+            };
+            let Some(off) = off(target).filter(|_| self.inside(target) > farthest) else {
+                continue;
+            };
+            // The one that guides stays.
+            let off = if guides { -1.0 } else { off };
+            if near.get(&target.id).is_none_or(|(least, _)| off < *least) {
+                near.insert(target.id, (off, target));
+            }
+        }
+        near.into_values().map(|(_, target)| target.clone()).collect()
     }
 
     /// Overlap of a target's surfaces along its axis, mm; negative: gap.

@@ -9,8 +9,6 @@ pub enum Standing {
     Candidate,
     /// Contradicts these targets, which came first.
     Conflict(Vec<TargetId>),
-    /// A fit of whole shapes that holds nothing which recognised surfaces do not hold.
-    Redundant,
     /// The operator switched it off.
     Off,
     /// Active, and held by contact alone: planes meet, a bore slides over a ball.

@@ -39,6 +39,7 @@ impl Session {
     fn follow(&mut self) {
         self.watch_moves();
         self.upload_if_due();
+        self.seek_ways();
         advance(self);
     }
 

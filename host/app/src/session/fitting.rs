@@ -222,7 +222,7 @@ fn points(path: &Path, seat: DVec3) -> Vec<DVec3> {
 }
 
 /// Bounding sphere of a part in its own frame, mm.
-fn extent(document: &Document, part: usize) -> Extent {
+pub(super) fn extent(document: &Document, part: usize) -> Extent {
     let shape = document.model.parts.get(part).map(|part| part.shape);
     let extent = shape.and_then(|shape| document.extents.get(shape));
     extent.copied().unwrap_or_default()

@@ -10,7 +10,7 @@ use std::sync::{Arc, Weak};
 use glam::DAffine3;
 use mortise_brep::CadModel;
 use mortise_guide::{Guide, GuideSettings, List};
-use mortise_mating::recognise::TargetId;
+use mortise_mating::recognise::{Target, TargetId};
 use mortise_protocol::message::ToDevice;
 use mortise_rig::Client;
 
@@ -29,6 +29,8 @@ pub struct Start {
     pub parts: Vec<usize>,
     /// The user's choices so far.
     pub fits: BTreeMap<TargetId, FitChoice>,
+    /// Fits of whole shapes that are followed.
+    pub followed: Vec<Target>,
     /// How targets are found and sent.
     pub settings: GuideSettings,
 }
@@ -52,7 +54,8 @@ pub fn start(tap: &Tap, start: Start, client: Weak<Client>, outbox: Outbox, link
     let items = tap.open();
     spawn("mortise-guide", move || {
         let model = start.model();
-        let guide = Guide::new(&model, start.parts, start.settings);
+        let mut guide = Guide::new(&model, start.parts, start.settings);
+        guide.follow(start.followed);
         run(guide, start.fits, &items, &client, &outbox, link);
     });
 }
@@ -108,6 +111,7 @@ fn apply(guide: &mut Guide<'_>, command: GuidanceCommand) {
         GuidanceCommand::Pin(id, pinned) => _ = guide.recogniser().pin(id, pinned),
         GuidanceCommand::SwitchOff(id, off) => _ = guide.recogniser().switch_off(id, off),
         GuidanceCommand::Set(settings) => guide.set(settings),
+        GuidanceCommand::Follow(fits) => guide.follow(fits),
         GuidanceCommand::PutBack => guide.put_back(),
     }
 }

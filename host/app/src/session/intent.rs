@@ -102,6 +102,8 @@ pub enum Intent {
     TurnOver,
     /// Put the part into the fit that is shown.
     PlaceFit,
+    /// Let guidance follow the way of the fit that is shown, or no longer.
+    FollowFit,
     /// Show no fits any more.
     DropFits,
     /// Ask where to write the project.
@@ -167,6 +169,7 @@ impl Intent {
                 | Self::ChooseFit(_)
                 | Self::NextFit
                 | Self::TurnOver
+                | Self::FollowFit
                 | Self::DropFits
                 | Self::SaveProject
                 | Self::WriteProject { .. }
@@ -304,6 +307,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         | Intent::ChooseFit(_)
         | Intent::NextFit
         | Intent::TurnOver
+        | Intent::FollowFit
         | Intent::PlaceFit => fits(session, intent),
         Intent::SaveProject | Intent::WriteProject { .. } => {
             session.document.is_none().then(|| NO_FILE.to_owned())
@@ -333,6 +337,7 @@ fn fits(session: &Session, intent: &Intent) -> Option<String> {
     match intent {
         Intent::FindFits => session.no_search(),
         Intent::PlaceFit => session.no_placing(),
+        Intent::FollowFit => session.no_following(),
         Intent::CancelFits => match fitting.and_then(|fitting| fitting.search.as_ref()) {
             None => no("No search for fits is under way"),
             Some(_) => None,

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use mortise_bake::Baked;
 use mortise_guide::GuideSettings;
-use mortise_mating::recognise::TargetId;
+use mortise_mating::recognise::{Target, TargetId};
 use mortise_protocol::message::{Capabilities, DeviceState, HandScript, Statistics, ToDevice};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
@@ -398,6 +398,7 @@ impl Connection {
         document: &Document,
         settings: GuideSettings,
         fits: &BTreeMap<TargetId, FitChoice>,
+        followed: Vec<Target>,
         outbox: &Outbox,
     ) {
         let Some(baked) = &document.baked else { return };
@@ -409,6 +410,7 @@ impl Connection {
                 placed: document.is_placed().then(|| document.placed.clone()),
                 parts,
                 fits: fits.clone(),
+                followed,
                 settings,
             },
             Arc::downgrade(&self.client),

@@ -48,6 +48,7 @@ mod tuning;
 mod update;
 pub mod verdict;
 mod visibility;
+mod ways;
 pub mod work;
 
 pub use self::intent::{Intent, obstacle};

@@ -16,6 +16,7 @@ use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
 use super::saved::Saved;
 use super::tap::Tap;
+use super::ways::WaysFound;
 use crate::kept::Mark;
 use crate::kept::project::Project;
 
@@ -65,6 +66,8 @@ pub enum Update {
     },
     /// Fits with one part were searched.
     Fits(FitsFound),
+    /// The ways of a part in the assembly were searched.
+    Ways(WaysFound),
     /// A file was chosen in a dialog.
     Chosen(Purpose, PathBuf),
     /// No file dialog is available: the window must ask for a path.

@@ -108,6 +108,7 @@ impl Session {
             Intent::NextFit => self.show_fit(|fitting, _| fitting.choose_next()),
             Intent::TurnOver => self.show_fit(Fitting::turn_over),
             Intent::PlaceFit => self.place_fit(),
+            Intent::FollowFit => self.follow_fit(),
             Intent::DropFits => self.drop_fits(),
             Intent::SaveProject => self.ask_for_path(Purpose::SaveProject),
             Intent::WriteProject { path, replace } => self.write_project(path, replace),
@@ -234,7 +235,13 @@ impl Session {
         self.guidance = List::default();
         self.guide.sending = self.guides();
         if let (Some(connection), Some(document)) = (self.connection(), &self.document) {
-            connection.guide(document, self.guide, &self.fits, &self.outbox);
+            connection.guide(
+                document,
+                self.guide,
+                &self.fits,
+                self.ways.followed(),
+                &self.outbox,
+            );
         }
     }
 

@@ -30,6 +30,7 @@ use super::recording::Recording;
 use super::threads::Cancel;
 use super::tour::Tour;
 use super::verdict::Verdict;
+use super::ways::Ways;
 use super::{pose, work};
 use crate::folder_cache::FolderCache;
 use crate::kept::Preferences;
@@ -133,6 +134,8 @@ pub struct Session {
     pub fits: BTreeMap<TargetId, FitChoice>,
     /// Parameters that the user has set, for each rig ([`Self::rig_of_parameters`]): a board gets those that were set on it.
     pub(super) own_parameters: BTreeMap<String, OwnParameters>,
+    /// Ways in that guidance follows.
+    pub(super) ways: Ways,
     /// Instructions in plain words.
     pub instructions: Instructions,
     /// What was moved, which can be undone.
@@ -172,6 +175,7 @@ impl Session {
             guidance: List::default(),
             fitting: None,
             partner: None,
+            ways: Ways::default(),
             notes: Notes::default(),
             method: Method::default(),
             recording: None,

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mortise_guide::GuideSettings;
-use mortise_mating::recognise::TargetId;
+use mortise_mating::recognise::{Target, TargetId};
 use mortise_protocol::message::Telemetry;
 
 /// Largest number of queued samples and commands; further samples are dropped because newer ones follow.
@@ -17,7 +17,7 @@ pub(super) enum Item {
 }
 
 /// A command of the operator to the guidance thread.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum GuidanceCommand {
     /// Pins a target, which keeps it in the list and gives it priority, or unpins it.
     Pin(TargetId, bool),
@@ -25,6 +25,8 @@ pub enum GuidanceCommand {
     SwitchOff(TargetId, bool),
     /// Sets how targets are found and sent.
     Set(GuideSettings),
+    /// Follows these fits of whole shapes, and no others.
+    Follow(Vec<Target>),
     /// Every part is back at its position in the file.
     PutBack,
 }

@@ -82,6 +82,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
             }
         }
         Update::Fits(found) => session.fits_found(found),
+        Update::Ways(found) => session.ways_found(found),
         Update::Chosen(purpose, path) => return Some(answer(purpose, path, true)),
         Update::NoDialog(purpose) => session.wants_path = Some(purpose),
         Update::Missing(missing) => session.missing = missing,
@@ -117,6 +118,7 @@ fn opened(session: &mut Session, Imported { document, saved }: Imported) {
     }
     session.selected = None;
     session.drop_fits();
+    session.ways.clear();
     session.partner = None;
     session.verdict = None;
     session.instructions.end();

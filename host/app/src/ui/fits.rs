@@ -141,6 +141,9 @@ fn list(ui: &mut Ui, session: &Session, document: &Document, fitting: &Fitting, 
         };
         let place = "Put the part there (P). Only while the motors are off";
         button("Place", "Place part in fit", Intent::PlaceFit, place);
+        let follow = if session.follows_shown_fit() { "Unguide" } else { "Guide" };
+        let hint = "Guide the held part along its way into this fit (G); again: no longer. Nothing moves by itself: the pull begins where the parts meet";
+        button(follow, "Guide along the way in", Intent::FollowFit, hint);
         button("Next", "Next fit", Intent::NextFit, "Show the next fit (N)");
         let over = "Show the fit in which the part goes in the other way round (T)";
         button("Turn over", "Turn part over", Intent::TurnOver, over);
@@ -238,7 +241,7 @@ pub fn over_view(ui: &mut Ui, rect: Rect, top: f32, session: &Session, view: &mu
         Vec2::new((rect.width() - 28.0).max(10.0), 20.0),
     );
     let text = format!(
-        "Fit {} of {}: {} with {}. N: next, T: turn over, P: place",
+        "Fit {} of {}: {} with {}. N: next, T: turn over, G: guide, P: place",
         fitting.chosen + 1,
         fitting.offers.len(),
         document.part_name(fitting.moving),

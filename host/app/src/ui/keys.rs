@@ -89,6 +89,7 @@ pub const KEYS: &[Group] = &[
             ("M", "find fits of the selected part"),
             ("N", "next fit"),
             ("T", "the part the other way round"),
+            ("G", "guide the held part along the way into the fit"),
             ("P", "place the part in the fit"),
         ],
     ),

@@ -321,6 +321,7 @@ fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 (Key::N, Intent::NextFit),
                 (Key::T, Intent::TurnOver),
                 (Key::P, Intent::PlaceFit),
+                (Key::G, Intent::FollowFit),
             ];
             for (key, intent) in keys {
                 if input.consume_key(Modifiers::NONE, key) {

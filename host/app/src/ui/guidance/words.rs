@@ -101,7 +101,6 @@ pub fn standing(document: &Document, list: &List, row: &Row, guides: bool) -> St
             let names: Vec<String> = with.iter().map(|id| named(document, list, *id)).collect();
             format!("Contradicts {}", names.join(" and "))
         }
-        Standing::Redundant => "Held by recognised surfaces".to_owned(),
         Standing::Off => "Switched off".to_owned(),
         Standing::ByContact => "Fits: held by contact".to_owned(),
         Standing::Waiting if guides => format!("Queued: {MAX_SENT} already guide"),
