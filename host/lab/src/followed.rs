@@ -29,6 +29,9 @@ const SETTLING_TICKS: u32 = 150;
 /// A part that comes so near to the end of its way is in, mm.
 const IN_MM: f64 = 0.1;
 
+/// Cells of the scene, mm: exact surfaces answer in them, of free-form faces patches within some micrometres.
+const CELL_MM: f64 = 1.0;
+
 /// How far the hand is off at the mouth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Off {
@@ -108,6 +111,7 @@ impl Followed {
         scenario.hand.grip_mm = middle.to_array();
         let options = BakeOptions {
             grabbable: Grabbable::Named(vec![moving.to_owned()]),
+            cell_mm: Some(CELL_MM),
             ..BakeOptions::default()
         };
         let scene = PreparedScene::bake(step, model, moving, &options)?;
