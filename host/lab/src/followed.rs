@@ -29,6 +29,8 @@ const SETTLING_TICKS: u32 = 150;
 /// A part that comes so near to the end of its way is in, mm.
 const IN_MM: f64 = 0.1;
 
+/// Straight legs of the hand's motion along the way.
+const LEGS: u32 = 8;
 /// Cells of the scene, mm: exact surfaces answer in them, of free-form faces patches within some micrometres.
 const CELL_MM: f64 = 1.0;
 
@@ -59,9 +61,30 @@ pub(crate) struct Followed {
     /// Placements of the moving part at the start and in the fit, and of the other part, mm.
     start: DAffine3,
     other: DAffine3,
-    /// Direction in which the part goes in, and travel from the mouth to the fit, mm.
-    into: DVec3,
+    way: Way,
+    /// Travel from the mouth to the fit, mm.
     depth_mm: f64,
+}
+
+/// A way in, in the world, mm.
+struct Way {
+    seat: DAffine3,
+    into: DVec3,
+    /// Point on a screw's axis, and its pitch.
+    screw: Option<(DVec3, f64)>,
+}
+
+impl Way {
+    /// Placement of the part after a travel along the way: 0 in the fit, negative before it.
+    fn at(&self, travel_mm: f64) -> DAffine3 {
+        let slide = DAffine3::from_translation(travel_mm * self.into);
+        let turn = self.screw.map_or(DAffine3::IDENTITY, |(point, pitch_mm)| {
+            let angle = std::f64::consts::TAU * travel_mm / pitch_mm;
+            let turn = DAffine3::from_quat(DQuat::from_axis_angle(self.into, angle));
+            DAffine3::from_translation(point) * turn * DAffine3::from_translation(-point)
+        });
+        slide * turn * self.seat
+    }
 }
 
 /// What an insertion showed.
@@ -101,7 +124,13 @@ impl Followed {
         let (fit, target) = fit.ok_or_else(|| bad("no fit with a way in was found".to_owned()))?;
         let (into, length_mm) = way(fit).ok_or_else(|| bad("the way in has no direction".to_owned()))?;
         let other = model.parts[b].placement;
-        let start = DAffine3::from_translation(-(length_mm + ROOM_MM) * into) * fit.placement;
+        let screw = fit.path.as_ref().and_then(|path| path.screw);
+        let way = Way {
+            seat: fit.placement,
+            into,
+            screw,
+        };
+        let start = way.at(-(length_mm + ROOM_MM));
         let depth_mm = mating_depth(&model, [a, b], fit, into);
         model.parts[a].placement = start;
         let middle = start.transform_point3(model.shapes[model.parts[a].shape].center_of_mass);
@@ -121,7 +150,7 @@ impl Followed {
             target,
             start,
             other,
-            into,
+            way,
             depth_mm,
         })
     }
@@ -148,17 +177,26 @@ impl Followed {
         let mut scenario = self.scenario.clone();
         let total = self.travel_mm(&self.start).abs();
         let before = total - self.depth_mm - BEFORE_MOUTH_MM;
-        let (x, y) = self.into.any_orthonormal_pair();
+        let (x, y) = self.way.into.any_orthonormal_pair();
         let (sin, cos) = off.direction_rad.sin_cos();
         let aside = off.aside_mm * (cos * x + sin * y);
-        let at = |travel: f64, aside: DVec3| (travel * self.into + aside).to_array();
-        let turn = off.turn.to_array().map(f64::to_degrees);
-        let down_s = (total + BEYOND_MM - before) / SPEED_MM_S;
-        scenario.hand.keyframes = vec![
-            key(0.0, [0.0; 3], [0.0; 3]),
-            key(0.5, at(before, aside), turn),
-            key(0.5 + down_s, at(total + BEYOND_MM, aside), turn),
-        ];
+        let grip = DVec3::from_array(scenario.hand.grip_mm);
+        let held = self.start.inverse().transform_point3(grip);
+        // The hand after a travel from the start, and off.
+        let off_at = |t_s: f64, travel: f64| {
+            let at = self.way.at(travel - total);
+            let rotation = DQuat::from_mat3(&(at.matrix3 * self.start.matrix3.inverse()));
+            let turn = (DQuat::from_scaled_axis(off.turn) * rotation).to_scaled_axis();
+            let offset = at.transform_point3(held) - grip + aside;
+            key(t_s, offset.to_array(), turn.to_array().map(f64::to_degrees))
+        };
+        let down = total + BEYOND_MM - before;
+        let down_s = down / SPEED_MM_S;
+        scenario.hand.keyframes = vec![key(0.0, [0.0; 3], [0.0; 3])];
+        scenario.hand.keyframes.extend((0..=LEGS).map(|leg| {
+            let share = f64::from(leg) / f64::from(LEGS);
+            off_at(0.5 + share * down_s, before + share * down)
+        }));
         scenario.run.duration_s = 1.0 + down_s;
         scenario
     }
@@ -167,7 +205,7 @@ impl Followed {
     fn travel_mm(&self, at: &DAffine3) -> f64 {
         let origin = at.transform_point3(self.target.moving.origin);
         let end = self.other.transform_point3(self.target.fixed.origin);
-        (origin - end).dot(self.into)
+        (origin - end).dot(self.way.into)
     }
 
     fn seen(&self, recording: &Recording) -> Seen {
