@@ -3,8 +3,10 @@
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, Face, Frame, Mesh, Part, Shape, Surface};
 use mortise_guide::{Guide, GuideSettings, Standing, When};
+use mortise_mating::Axis;
+use mortise_mating::recognise::{Target, TargetId, Turn, Way};
 use mortise_protocol::message::{
-    ConstraintKind, ConstraintTarget, Telemetry, ToDevice, TouchingPair, WirePose, WireWrench,
+    ConstraintKind, ConstraintTarget, PathTurn, Telemetry, ToDevice, TouchingPair, WirePose, WireWrench,
 };
 use proptest::prelude::*;
 
@@ -226,6 +228,155 @@ fn switched_off_altogether_it_recognises_and_sends_nothing() {
     guide.set(GuideSettings::default());
     assert_eq!(targets(&guide.hear(&sample(32, 0.5, -10.0, true))).len(), 1);
     assert_eq!(guide.list().rows[0].standing, Standing::Sent);
+}
+
+/// The way of the peg down into the hole, whose end is `z` above the hole's lower end, `x` off its axis.
+fn way(turn: Turn, x: f64, z: f64) -> Target {
+    let down = |origin: DVec3| Axis {
+        origin,
+        direction: -DVec3::Z,
+    };
+    Target {
+        id: TargetId {
+            moving_part: 1,
+            fixed_part: 0,
+            surfaces: None,
+        },
+        kind: ConstraintKind::Path,
+        moving: down(DVec3::ZERO),
+        fixed: down(DVec3::new(x, 0.0, z)),
+        play_mm: 0.5,
+        radius_mm: 0.0,
+        inner_moves: true,
+        moving_faces: vec![0],
+        fixed_faces: vec![0],
+        way: Some(Way {
+            orientation: DQuat::IDENTITY,
+            turn,
+            length_mm: 40.0,
+            ends: true,
+            sliding: vec![[0, 0]],
+        }),
+    }
+}
+
+fn kinds(messages: &[ToDevice]) -> Vec<ConstraintKind> {
+    targets(messages).iter().map(|target| target.kind).collect()
+}
+
+#[test]
+fn a_way_is_followed_with_recognition_off_on_contact_or_when_near() {
+    let model = model();
+    for when in When::ALL {
+        let mut guide = guide(&model, when);
+        guide.set(GuideSettings {
+            when,
+            recognising: false,
+            ..GuideSettings::default()
+        });
+        guide.follow(vec![way(Turn::Geared(0.0), 0.0, 0.0)]);
+        assert_eq!(guide.hear(&sample(0, 0.5, 5.0, false)), [], "5 mm in front");
+        let in_front = guide.hear(&sample(16, 0.5, 1.0, false));
+        assert_eq!(targets(&in_front).len(), usize::from(when == When::Near));
+        let sent = match when {
+            When::Near => in_front,
+            When::Touching => guide.hear(&sample(32, 0.5, 0.0, true)),
+        };
+        let [target] = targets(&sent)[..] else {
+            panic!("one target: {sent:?}")
+        };
+        assert_eq!((target.kind, target.static_part), (ConstraintKind::Path, BLOCK));
+        let path = target.path.expect("of a path");
+        assert_eq!(path.turn, PathTurn::Geared(0.0));
+        assert!(path.ends && target.faces.as_slice() == [(0, 0)]);
+        // Off the walls it touches nothing, and stays guided.
+        for tick in (48..600).step_by(16) {
+            let messages = guide.hear(&sample(tick, 0.0, -10.0, false));
+            assert!(
+                messages.iter().all(|m| matches!(m, ToDevice::SetTarget(_))),
+                "{messages:?}"
+            );
+        }
+        assert_eq!(guide.list().rows.len(), 1);
+        assert_eq!(guide.list().rows[0].standing, Standing::Sent);
+        let id = target.id;
+        guide.follow(Vec::new());
+        let cleared: Vec<ToDevice> = (600..2000)
+            .step_by(16)
+            .flat_map(|tick| guide.hear(&sample(tick, 0.0, -10.0, false)))
+            .filter(|message| *message == ToDevice::ClearTarget { id })
+            .collect();
+        assert_eq!(cleared.len(), 1, "no longer followed");
+    }
+}
+
+/// At the end of a screw whose part is turned as the fit asks; a turn later along the way it is aligned again, and between it is not.
+#[test]
+fn a_screw_is_aligned_where_its_turn_agrees_with_the_travel() {
+    let model = model();
+    let pitch_mm = 8.0;
+    for (short_mm, aligned) in [(0.0, true), (8.0, true), (4.0, false)] {
+        let mut guide = guide(&model, When::Touching);
+        guide.set(GuideSettings {
+            recognising: false,
+            ..GuideSettings::default()
+        });
+        let turn = Turn::Geared(std::f64::consts::TAU / pitch_mm);
+        guide.follow(vec![way(turn, 0.0, 10.0)]);
+        // The way ends with the peg's end at −30.
+        let sent = guide.hear(&sample(0, 0.2, -30.0 + short_mm, true));
+        assert_eq!(targets(&sent).len(), usize::from(aligned), "{short_mm} mm short");
+        if let [target] = targets(&sent)[..] {
+            let turn = target.path.map(|path| path.turn);
+            assert_eq!(
+                turn,
+                Some(PathTurn::Geared((1e3 * std::f64::consts::TAU / pitch_mm) as f32))
+            );
+        }
+    }
+}
+
+/// A round peg that may turn needs no more than the axis; one that must not turn is held by both.
+#[test]
+fn a_way_guides_only_where_it_holds_more_than_recognised_surfaces() {
+    let model = model();
+    use ConstraintKind::{Concentric, Path};
+    for (turn, expected) in [
+        (Turn::Free, vec![Concentric]),
+        (Turn::Geared(0.0), vec![Concentric, Path]),
+    ] {
+        let mut guide = guide(&model, When::Touching);
+        guide.follow(vec![way(turn, 0.0, 0.0)]);
+        let sent = guide.hear(&sample(0, 0.5, -10.0, true));
+        assert_eq!(kinds(&sent), expected, "{turn:?}");
+        assert_eq!(guide.list().rows.len(), expected.len());
+        assert_eq!(guide.list().freedom.count(), 3 - expected.len());
+    }
+}
+
+#[test]
+fn of_several_places_the_nearest_guides_and_another_choice_goes_to_the_board_at_once() {
+    let model = model();
+    let mut guide = guide(&model, When::Touching);
+    guide.set(GuideSettings {
+        recognising: false,
+        ..GuideSettings::default()
+    });
+    let places = [0.0, 2.0].map(|x| way(Turn::Geared(0.0), x, 0.0));
+    guide.follow(places.to_vec());
+    let sent = guide.hear(&sample(0, 1.7, -10.0, true));
+    let [first] = targets(&sent)[..] else {
+        panic!("one target: {sent:?}")
+    };
+    assert_eq!(first.fixed.point[0], 2e-3);
+    // It stays with what guides, although the other is nearer now.
+    assert_eq!(targets(&guide.hear(&sample(16, 0.4, -10.0, true))).len(), 0);
+    guide.follow(vec![way(Turn::Geared(0.0), 0.0, 5.0)]);
+    let sent = guide.hear(&sample(32, 0.4, -10.0, true));
+    let [second] = targets(&sent)[..] else {
+        panic!("one target: {sent:?}")
+    };
+    assert_eq!((second.id, second.fixed.point), (first.id, [0.0, 0.0, 5e-3]));
 }
 
 #[test]

@@ -190,7 +190,7 @@ impl<'a> Recogniser<'a> {
                 idle: 0,
             });
             // Another fit of the same two parts takes its place.
-            if entry.target.way != target.way {
+            if target.way.is_some() && entry.target != target {
                 entry.target = target;
             }
             entry.idle = 0;
