@@ -5,8 +5,8 @@
 use std::io::Write as _;
 use std::time::Instant;
 
-use mortise_fit::{Fit, FitOptions, find};
-use mortise_shapes::{Designed, KINDS};
+use mortise_fit::{Fit, FitOptions, PathKind, find};
+use mortise_shapes::{Designed, Free, KINDS};
 
 #[test]
 fn designed_poses_are_found() {
@@ -64,10 +64,16 @@ fn tried(seed: u64, designed: &Designed) -> (String, bool) {
     let worst = places.iter().copied().fold(0.0, f64::max);
     let first = (found.fits.first())
         .is_some_and(|fit| (0..places.len()).any(|index| off(fit, index) <= designed.within));
-    let right = first && worst <= designed.within;
     let path = found.fits.first().and_then(|fit| fit.path.as_ref());
+    // What the designed pose leaves free along a straight way and about it.
+    let learnt = path.is_none_or(|path| {
+        path.kind != PathKind::Line
+            || path.spin.is_some() == (designed.free == Free::Spin)
+                && path.ends == (designed.free != Free::SlideZ)
+    });
+    let right = first && worst <= designed.within && learnt;
     let line = format!(
-        "{seed} {}: {} c {:.3} mm, {} of {} places, off {:.3} µm, {} fits, {:.2} s, gap {:?} µm, path {:?}",
+        "{seed} {}: {} c {:.3} mm, {} of {} places, off {:.3} µm, {} fits, {:.2} s, gap {:?} µm, path {:?}, {}",
         designed.kind,
         if right { "right" } else { "WRONG" },
         designed.clearance,
@@ -81,6 +87,10 @@ fn tried(seed: u64, designed: &Designed) -> (String, bool) {
             .first()
             .map(|fit| (1e5 * fit.clearance.min_mm).round() / 100.0),
         path.map(|path| (path.kind, (1e5 * path.smallest_clearance_mm).round() / 100.0)),
+        path.map_or_else(String::new, |path| {
+            let about = path.spin.map_or("", |_| ", free to turn");
+            format!("ends {}{about}", path.ends)
+        }),
     );
     (line, right)
 }

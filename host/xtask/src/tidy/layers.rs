@@ -77,7 +77,11 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/energy", &["mortise-bake", "mortise-brep"]),
-    ("host/fit", &["mortise-bake", "mortise-brep", "mortise-mating"]),
+    ("host/shapes", &[]),
+    (
+        "host/fit",
+        &["mortise-bake", "mortise-brep", "mortise-mating", "mortise-shapes"],
+    ),
     ("host/inspect", &["mortise-bake", "mortise-brep", "mortise-task"]),
     (
         "host/record",
@@ -93,7 +97,12 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/words", &["mortise-brep", "mortise-mating", "mortise-task"]),
     (
         "host/guide",
-        &["mortise-brep", "mortise-mating", "mortise-protocol"],
+        &[
+            "mortise-brep",
+            "mortise-fit",
+            "mortise-mating",
+            "mortise-protocol",
+        ],
     ),
     (
         "host/scenario",
