@@ -63,12 +63,14 @@ pub fn measure_tables(
     tables: &[(&str, Option<&[&str]>)],
     by: By,
 ) -> Result<Vec<Measured>> {
-    let runs: Vec<(usize, &str, Option<&str>)> = (tables.iter().enumerate())
+    let mut runs: Vec<(usize, &str, Option<&str>)> = (tables.iter().enumerate())
         .flat_map(|(index, (name, parts))| {
             let parts = parts.map_or_else(|| vec![None], |parts| parts.iter().copied().map(Some).collect());
             parts.into_iter().map(move |part| (index, *name, part))
         })
         .collect();
+    // A whole table takes longer than a part: last, it would run beside an idle core.
+    runs.sort_by_key(|(.., part)| part.is_some());
     let next = AtomicUsize::new(0);
     let done = Mutex::new(BTreeMap::new());
     let workers = std::thread::available_parallelism().map_or(1, |cores| cores.get().min(runs.len()));

@@ -131,16 +131,38 @@ pub fn ensure(groups: &[Group], consent: Consent) -> Result<bool> {
     if !agreed(consent, &names, &missing.rust)? {
         return Ok(false);
     }
-    if !names.is_empty() {
-        apt::install(&names)?;
+    let packages = || match names.as_slice() {
+        [] => Ok(()),
+        names => apt::install(names),
+    };
+    let rust = || rust::add(&missing.rust, &root);
+    if std::io::stdin().is_terminal() {
+        // One after the other, because a password may be asked for.
+        packages()?;
+        rust()?;
+    } else {
+        let (packages, rust) = side_by_side(packages, rust);
+        packages?;
+        rust?;
     }
-    rust::add(&missing.rust, &root)?;
 
     let still = Missing::find(groups, &Machine::this()?, &root)?;
     if !still.is_empty() {
         bail!("installed, yet still not found: {}", still.names().join(" "));
     }
     Ok(true)
+}
+
+/// Packages are unpacked on one core, which leaves the others to the compilation of a tool.
+fn side_by_side<A, B: Send>(here: impl FnOnce() -> A, there: impl FnOnce() -> B + Send) -> (A, B) {
+    std::thread::scope(|scope| {
+        let there = scope.spawn(there);
+        let here = here();
+        let there = there
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        (here, there)
+    })
 }
 
 /// Prints the commands and decides whether they run: asks at the terminal unless consent was given beforehand.

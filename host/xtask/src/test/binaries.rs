@@ -36,7 +36,7 @@ impl Binary {
     }
 
     /// With what `cargo test` sets for a test that runs.
-    fn command(&self) -> Command {
+    fn job(&self, root: &Path) -> Job {
         let mut command = Command::new(&self.program);
         // Those of xtask itself, which cargo started.
         for (name, _) in std::env::vars_os() {
@@ -49,8 +49,19 @@ impl Binary {
             .current_dir(&self.folder)
             .env("CARGO_MANIFEST_DIR", &self.folder)
             .env("CARGO_MANIFEST_PATH", self.folder.join("Cargo.toml"));
-        command
+        Job {
+            title: self.title(root),
+            command,
+        }
     }
+}
+
+/// A command that runs tests.
+pub struct Job {
+    /// Its name in what is printed.
+    pub title: String,
+    /// Its output is what `cargo test` prints.
+    pub command: Command,
 }
 
 /// What the threads that run programs say.
@@ -67,24 +78,28 @@ struct Running {
     lines: Vec<String>,
 }
 
-/// Builds what `build` (a `cargo test --no-run …`) asks for and runs it, `at_once` programs at a time, those in `first` (by title) before all others;
-/// `prepare` is called with each command. All run, also after a failure; the output of each is handed to `on_line` when it ended.
+/// Builds what `build` (a `cargo test --no-run …`) asks for and runs it, `at_once` programs at a time, `beside` and those in `first` (by title) before
+/// all others; `prepare` is called with each command. All run, also after a failure; the output of each is handed to `on_line` when it ended.
 ///
 /// # Errors
 /// When something does not compile, cannot be run or fails: the message names the programs; when one in `first` is not among them.
 pub fn run(
     root: &Path,
     build: &mut Command,
+    beside: Job,
     first: &[&str],
     at_once: usize,
-    prepare: impl Fn(&mut Command) + Sync,
+    prepare: impl Fn(&mut Command),
     on_line: impl FnMut(&str),
 ) -> Result<()> {
     let mut binaries = Vec::new();
     build.arg("--message-format=json-render-diagnostics");
     shell::run_lines(build, |line| binaries.extend(binary_of(line)))?;
     order(&mut binaries, root, first)?;
-    let failed = run_all(&binaries, root, at_once, prepare, on_line);
+    let mut jobs = vec![beside];
+    jobs.extend(binaries.iter().map(|binary| binary.job(root)));
+    jobs.iter_mut().for_each(|job| prepare(&mut job.command));
+    let failed = run_all(jobs, at_once, on_line);
     if !failed.is_empty() {
         bail!("{} failed", failed.join(", "));
     }
@@ -92,24 +107,18 @@ pub fn run(
 }
 
 /// Runs them, and returns those that failed, in words.
-fn run_all(
-    binaries: &[Binary],
-    root: &Path,
-    at_once: usize,
-    prepare: impl Fn(&mut Command) + Sync,
-    mut on_line: impl FnMut(&str),
-) -> Vec<String> {
-    let queue: Mutex<VecDeque<usize>> = Mutex::new((0..binaries.len()).collect());
+fn run_all(jobs: Vec<Job>, at_once: usize, mut on_line: impl FnMut(&str)) -> Vec<String> {
+    let (titles, commands): (Vec<String>, Vec<Command>) =
+        (jobs.into_iter()).map(|job| (job.title, job.command)).unzip();
+    let queue: Mutex<VecDeque<(usize, Command)>> = Mutex::new(commands.into_iter().enumerate().collect());
     let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
     let (tell, news) = mpsc::channel();
     let mut failed = Vec::new();
     std::thread::scope(|scope| {
-        for _ in 0..at_once.clamp(1, binaries.len().max(1)) {
-            let (tell, next, prepare) = (tell.clone(), &next, &prepare);
+        for _ in 0..at_once.clamp(1, titles.len().max(1)) {
+            let (tell, next) = (tell.clone(), &next);
             scope.spawn(move || {
-                while let Some(index) = next() {
-                    let mut command = binaries[index].command();
-                    prepare(&mut command);
+                while let Some((index, mut command)) = next() {
                     // The receiver lives as long as this scope.
                     let _ = tell.send(Said::Started(index));
                     let ended = run_one(&mut command, |line| {
@@ -140,7 +149,7 @@ fn run_all(
                         continue;
                     };
                     let run = running.swap_remove(place);
-                    let title = binaries[index].title(root);
+                    let title = &titles[index];
                     println!(
                         "\n     Running {title}, {:.1} s",
                         run.since.elapsed().as_secs_f64()
@@ -156,7 +165,7 @@ fn run_all(
                 Err(RecvTimeoutError::Timeout) => {
                     heard = Instant::now();
                     for run in &running {
-                        eprintln!("{}", still(run, &binaries[run.index].title(root)));
+                        eprintln!("{}", still(run, &titles[run.index]));
                     }
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
@@ -283,16 +292,14 @@ mod tests {
             ..of("lost")
         };
         let binaries = [of("good"), of("bad"), lost, of("fine")];
-        let count = std::sync::atomic::AtomicUsize::new(0);
-        let prepare = |command: &mut Command| {
-            command.arg("counts_come_from_result_lines_alone");
-            // The second is asked for what it does not know.
-            if count.fetch_add(1, std::sync::atomic::Ordering::SeqCst) == 1 {
-                command.arg("--no-such-option");
-            }
-        };
+        let mut jobs = binaries.map(|binary| binary.job(here));
+        for job in &mut jobs {
+            job.command.arg("counts_come_from_result_lines_alone");
+        }
+        // The second is asked for what it does not know.
+        jobs[1].command.arg("--no-such-option");
         let mut counts = crate::test::report::Counts::default();
-        let failed = run_all(&binaries, here, 1, prepare, |line| counts.add_line(line));
+        let failed = run_all(jobs.into(), 1, |line| counts.add_line(line));
         assert_eq!(failed.len(), 2, "{failed:?}");
         assert!(failed[0].starts_with(" bad (exit status"), "{failed:?}");
         assert!(failed[1].starts_with(" lost ("), "{failed:?}");

@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 
 use super::bench::Bench;
-use super::binaries;
+use super::binaries::{self, Job};
 use crate::{figures, firmware as boards, fuzz, package, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
@@ -17,7 +17,7 @@ const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// cases each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
 /// Test programs that take longest, longest first: they are begun first, so that none of them runs alone at the end.
-const LONGEST: [&str; 3] = ["host/lab mortise_lab", "firmware/orders depth", "host/app flow"];
+const LONGEST: [&str; 3] = ["host/lab mortise_lab", "firmware/orders depth", "host/app window"];
 const BOARD_SIDE: [&str; 5] = [
     "mortise-protocol",
     "mortise-haptics",
@@ -124,7 +124,8 @@ pub fn build(bench: &mut Bench) -> Result<String> {
     Ok(String::new())
 }
 
-/// All tests but those on a rig: programs side by side, see [`binaries`], then examples in documentation.
+/// All tests but those on a rig: programs side by side, see [`binaries`], and beside the first of them examples in documentation, one crate's after the
+/// other's.
 pub fn unit(bench: &mut Bench) -> Result<String> {
     let mut build = shell::cargo(&bench.root);
     build.args([
@@ -135,16 +136,19 @@ pub fn unit(bench: &mut Bench) -> Result<String> {
         HIL_TESTS,
         "--no-run",
     ]);
-    let counts = &mut bench.counts;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let programs = binaries::run(&bench.root, &mut build, &LONGEST, cores, seed, |line| {
-        println!("{line}");
-        counts.add_line(line);
-    });
     let mut examples = shell::cargo(&bench.root);
     examples.args(["test", "--release", "--workspace", "--doc", "--no-fail-fast"]);
-    let examples = counted(bench, &mut examples);
-    programs.and(examples)
+    let examples = Job {
+        title: "examples in documentation".to_owned(),
+        command: examples,
+    };
+    let counts = &mut bench.counts;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    binaries::run(&bench.root, &mut build, examples, &LONGEST, cores, seed, |line| {
+        println!("{line}");
+        counts.add_line(line);
+    })?;
+    some_ran(bench)
 }
 
 /// Parts of boards that need no chip are libraries, tested here on the PC.
@@ -239,13 +243,18 @@ fn seed(command: &mut Command) {
     }
 }
 
-/// Runs tests and counts them, including failed ones; a run without tests is a failure, because it shows nothing.
+/// Runs tests and counts them, including failed ones.
 fn counted(bench: &mut Bench, command: &mut Command) -> Result<String> {
     seed(command);
     shell::run_lines(command, |line| {
         println!("{line}");
         bench.counts.add_line(line);
     })?;
+    some_ran(bench)
+}
+
+/// A run without tests is a failure, because it shows nothing.
+fn some_ran(bench: &Bench) -> Result<String> {
     if bench.counts.passed == 0 {
         bail!("no test was run");
     }

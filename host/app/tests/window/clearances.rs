@@ -1,8 +1,6 @@
 //! The list of gaps and clashes in the window: searched on request, and a click shows the place.
 
-mod common;
-
-use common::{click, harness, open_sample};
+use crate::common::{click, harness, open_sample};
 use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

@@ -1,9 +1,7 @@
 //! Flags and constraint kinds have one table each in `protocol`: the window's text and `docs/protocol.md` follow it. Parameters in the
 //! window: unit tests of `src/ui/parameters.rs`.
 
-mod common;
-
-use common::{click, holding, until};
+use crate::common::{click, holding, until};
 use egui::Shape;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

@@ -1,8 +1,6 @@
 //! Fits found in the window: shown before anything moves, looked through by keys, and accepted while the motors are off.
 
-mod common;
-
-use common::{arm, click, connect, harness, holding, open_sample, picture, poses, press, until};
+use crate::common::{arm, click, connect, harness, holding, open_sample, picture, poses, press, until};
 use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};

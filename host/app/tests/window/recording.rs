@@ -1,10 +1,8 @@
 //! Recording from the window: a button, a file in the user's folder, and the same bits when it is computed again.
 
-mod common;
-
 use std::path::PathBuf;
 
-use common::{arm, click, connect, harness, open_sample, until};
+use crate::common::{arm, click, connect, harness, open_sample, until};
 use mortise::session::Session;
 use mortise::session::link::Link;
 use mortise_record::{Recording, replay};

@@ -1,8 +1,6 @@
 //! Parts hidden, shown alone and searched for in the window.
 
-mod common;
-
-use common::{click, harness, holding, open_sample, picture};
+use crate::common::{click, harness, holding, open_sample, picture};
 use egui::{Key, Modifiers, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

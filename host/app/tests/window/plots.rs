@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-mod common;
-
-use common::{click, harness, until};
+use crate::common::{click, harness, until};
 use egui::{Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

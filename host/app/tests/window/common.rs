@@ -1,6 +1,4 @@
 //! Shared helpers of the window tests: a window without a display, and an operator's first steps.
-// Each test program uses only some of them.
-#![allow(dead_code)]
 
 use std::path::Path;
 use std::sync::Arc;

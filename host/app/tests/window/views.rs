@@ -1,8 +1,6 @@
 //! Standard views, projection, view cube and how the view turns, in the window.
 
-mod common;
-
-use common::{click, harness, open_sample, press, worst};
+use crate::common::{click, harness, open_sample, press, worst};
 use egui::{Key, Modifiers, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

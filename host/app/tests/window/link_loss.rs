@@ -1,15 +1,12 @@
 //! A lost link in the window: reported once, with the reason, and with a button that reconnects. The board is simulated behind a
 //! pseudo-terminal, whose cable can be cut.
-#![cfg(unix)]
 
 use std::io::{ErrorKind, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-mod common;
-
-use common::{arm, click, harness, open_sample, until};
+use crate::common::{arm, click, harness, open_sample, until};
 use egui_kittest::kittest::Queryable as _;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session};

@@ -1,8 +1,6 @@
 //! STOP and the state at every window size and scale: complete, on screen, and not covered.
 
-mod common;
-
-use common::{arm, click, connect, harness, open_sample, until};
+use crate::common::{arm, click, connect, harness, open_sample, until};
 use egui::{Rect, Role, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};

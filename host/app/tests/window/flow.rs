@@ -6,9 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-mod common;
-
-use common::{arm, click, connect, harness, holding, open_sample, until, worst};
+use crate::common::{arm, click, connect, harness, holding, open_sample, until, worst};
 use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};

@@ -1,7 +1,5 @@
 //! The window follows the desktop's theme: the settings portal on a message bus of its own, and the program's set-up in a process on that bus.
 
-#![cfg(target_os = "linux")]
-
 use std::io::{BufRead as _, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -64,7 +62,7 @@ fn the_window_follows_the_desktop() {
         .and_then(|builder| builder.build())
         .expect("the portal is on the bus");
     let child = Command::new(std::env::current_exe().expect("this program"))
-        .args(["--exact", "the_window_follows_the_desktop"])
+        .args(["--exact", "desktop_theme::the_window_follows_the_desktop"])
         .env(BUS, address.trim())
         .env(ON_THE_BUS, "1")
         .output()

@@ -3,9 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-mod common;
-
-use common::{arm, click, connect, harness, open_sample, until, worst};
+use crate::common::{arm, click, connect, harness, open_sample, until, worst};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;

@@ -2,9 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-mod common;
-
-use common::{click, harness_on, until, worst};
+use crate::common::{click, harness_on, until, worst};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mortise::kept::{Preferences, StateFolder};

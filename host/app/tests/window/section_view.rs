@@ -1,8 +1,6 @@
 //! The section view's controls in the window, without a graphics device.
 
-mod common;
-
-use common::{click, harness, open_sample};
+use crate::common::{click, harness, open_sample};
 use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

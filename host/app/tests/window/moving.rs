@@ -1,8 +1,6 @@
 //! Parts moved in the window by handles, keys and numbers, and undo and redo of every move.
 
-mod common;
-
-use common::{arm, click, connect, harness, holding, open_sample, poses, until};
+use crate::common::{arm, click, connect, harness, holding, open_sample, poses, until};
 use egui::{Event, Key, Modifiers, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-mod common;
-
-use common::{arm, click, connect, harness_on, until, worst};
+use crate::common::{arm, click, connect, harness_on, until, worst};
 use egui_kittest::Harness;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise::kept::StateFolder;
@@ -215,7 +213,7 @@ fn a_killed_program_loses_nothing_but_the_last_moments() {
     for more_ms in [0, 1_400, 1_650] {
         let program = std::env::current_exe().expect("this program");
         let mut child = Command::new(program)
-            .args(["--exact", "program_to_be_killed", "--ignored"])
+            .args(["--exact", "project::program_to_be_killed", "--ignored"])
             .env(PLACE, place.path())
             .stdout(std::process::Stdio::null())
             .spawn()

@@ -1,8 +1,6 @@
 //! The measuring tool in the window: what clicks pick, what is said of it, and that it follows the parts.
 
-mod common;
-
-use common::{click, harness, open_sample, press};
+use crate::common::{click, harness, open_sample, press};
 use egui::{Key, OutputCommand, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

@@ -5,9 +5,7 @@
 
 use std::sync::Arc;
 
-mod common;
-
-use common::{harness_with, open_sample};
+use crate::common::{harness_with, open_sample};
 use egui::epaint::text::{FallbackRequest, FontProvider as _};
 use egui::{Color32, ColorImage, FontFamily, FontId};
 use egui_kittest::Harness;

@@ -1,8 +1,6 @@
 //! The command line in the window: instructions in plain words, their questions and refusals.
 
-mod common;
-
-use common::{arm, click, connect, harness, open_sample, poses, press, until};
+use crate::common::{arm, click, connect, harness, open_sample, poses, press, until};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

@@ -1,0 +1,26 @@
+//! Tests of the window, a module for each of its parts: one program, because linking the window takes longer than most of the tests.
+
+mod clearances;
+mod command_line;
+mod common;
+#[cfg(target_os = "linux")]
+mod desktop_theme;
+mod fits;
+mod flow;
+mod fonts;
+mod getting_started;
+mod guidance;
+mod kept;
+mod layout;
+#[cfg(unix)]
+mod link_loss;
+mod measure;
+mod moving;
+mod picture;
+mod plots;
+mod project;
+mod recording;
+mod said_once;
+mod section_view;
+mod views;
+mod visibility;
