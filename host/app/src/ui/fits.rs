@@ -135,15 +135,16 @@ fn list(ui: &mut Ui, session: &Session, document: &Document, fitting: &Fitting, 
         });
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
+        let follows = session.follows_shown_fit();
         let mut button = |text: &str, name: &str, intent: Intent, hint: &str| {
-            control::intent_button(ui, session, wanted, egui::Button::new(text), intent, hint)
-                .accessible_name(name);
+            let chosen = follows && intent == Intent::FollowFit;
+            let button = egui::Button::new(text).selected(chosen);
+            control::intent_button(ui, session, wanted, button, intent, hint).accessible_name(name);
         };
         let place = "Put the part there (P). Only while the motors are off";
         button("Place", "Place part in fit", Intent::PlaceFit, place);
-        let follow = if session.follows_shown_fit() { "Unguide" } else { "Guide" };
-        let hint = "Guide the held part along its way into this fit (G); again: no longer. Nothing moves by itself: the pull begins where the parts meet";
-        button(follow, "Guide along the way in", Intent::FollowFit, hint);
+        let guide = "Guide the held part along its way into this fit, from where the parts meet (G); again: no longer";
+        button("Guide", "Guide along the way in", Intent::FollowFit, guide);
         button("Next", "Next fit", Intent::NextFit, "Show the next fit (N)");
         let over = "Show the fit in which the part goes in the other way round (T)";
         button("Turn over", "Turn part over", Intent::TurnOver, over);

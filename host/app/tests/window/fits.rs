@@ -143,6 +143,27 @@ fn a_held_part_is_placed_only_once_the_motors_are_off() {
     click(&mut harness, "STOP");
 }
 
+/// The shown fit is followed and no longer; what guides is listed with what recognised surfaces hold.
+#[test]
+fn a_held_part_is_guided_along_the_way_into_a_fit_that_is_chosen() {
+    let mut harness = holding();
+    press(&mut harness, Key::M);
+    until(&mut harness, "searched", searched);
+    harness.run_steps(2);
+    assert!(!harness.state().session.follows_shown_fit());
+    press(&mut harness, Key::G);
+    assert!(harness.state().session.follows_shown_fit());
+    press(&mut harness, Key::N);
+    assert!(!harness.state().session.follows_shown_fit(), "another one is");
+    press(&mut harness, Key::N);
+    assert!(harness.state().session.follows_shown_fit());
+    harness.run_steps(2);
+    harness.get_by_label("Guide along the way in");
+    click(&mut harness, "Guide along the way in");
+    assert!(!harness.state().session.follows_shown_fit());
+    assert_eq!(harness.state().session.grabbed(), Some(1), "nothing else happens");
+}
+
 #[test]
 fn a_cancelled_search_reports_nothing_more() {
     let mut harness = harness();

@@ -96,7 +96,7 @@ pub enum State {
     Far,
     /// Contradicts these targets, which came first.
     Conflict(Vec<TargetId>),
-    /// A fit of whole shapes that holds nothing which recognised surfaces do not hold.
+    /// A fit of whole shapes that holds nothing which recognised surfaces do not hold, or of whose parts the operator switched such surfaces off.
     Redundant,
     /// Switched off by the operator.
     Off,
@@ -322,6 +322,11 @@ impl<'a> Recogniser<'a> {
         let shape = self.model.parts.get(seen.moving_part).map_or(0, |p| p.shape);
         let size = self.surfaces.get(shape).map_or(1.0, |s| s.size).max(1e-6);
         let mut order = Vec::new();
+        // Between parts of which the operator switched a target off, no fit of the whole shapes takes its place.
+        let switched_off: Vec<[usize; 2]> = (self.entries.values())
+            .filter(|entry| entry.off && entry.target.way.is_none())
+            .map(|entry| [entry.target.id.moving_part, entry.target.id.fixed_part])
+            .collect();
         for (id, entry) in &mut self.entries {
             entry.alignment_error = entry.target.alignment_error(pose, &seen.poses[id.fixed_part]);
             let was_active = entry.state == State::Active;
@@ -333,8 +338,12 @@ impl<'a> Recogniser<'a> {
             let distance_mm = limits.distance_mm + entry.target.play_mm.max(0.0);
             let near = entry.alignment_error.distance_mm <= factor * distance_mm
                 && entry.alignment_error.angle_rad <= factor * limits.angle_rad;
+            let replaced = id.surfaces.is_none()
+                && !entry.pinned
+                && switched_off.contains(&[id.moving_part, id.fixed_part]);
             entry.state = match (entry.off, near) {
                 (true, _) => State::Off,
+                (false, _) if replaced => State::Redundant,
                 (false, false) => State::Far,
                 (false, true) => {
                     let off = entry.alignment_error.distance_mm / distance_mm
