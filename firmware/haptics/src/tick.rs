@@ -42,7 +42,7 @@ const FASTER: f32 = 2.0;
 /// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-27, thesis pair with 20 µm clearance baked at 0.5 mm cells
 /// with a pointshell of 25 µm: at most 71,820 instructions pressed to the wall with 5 N and slid at 10 mm/s, 15,140 in free motion; with a
 /// pointshell of 5 µm 72,100 and 15,140. A peg of 0.7 m with 0.2 mm clearance and a shell of 50 µm, pressed in the same way and slid at 20 mm/s,
-/// takes 116,360 (`mortise-lab figures contact --quick`). Into a fit of 0.02 mm: 110,380 guided, 110,360 by collision alone; 75,720 with four
+/// takes 116,360 (`mortise-lab figures contact --quick`). Into a fit of 0.02 mm: 107,900 guided, 107,880 by collision alone; 78,760 with four
 /// different targets (`mortise-lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();

@@ -18,6 +18,7 @@ use std::collections::BTreeMap;
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
+use mortise_protocol::message::ConstraintKind;
 
 pub use solve::{Freedom, Solution};
 pub use target::{AlignmentError, Target, TargetId, Turn, Way};
@@ -362,6 +363,10 @@ impl<'a> Recogniser<'a> {
         let mut kept: Vec<TargetId> = Vec::new();
         let mut freedom = solve(&[], pose, size).freedom;
         for (.., id) in order {
+            // Contact holds planes, and lets a part stand off them by the play of a way: they do not hinder it.
+            let beside: Vec<TargetId> = (kept.iter().copied())
+                .filter(|k| id.surfaces.is_some() || self.entries[k].target.kind != ConstraintKind::Coplanar)
+                .collect();
             let together = |ids: &[TargetId]| {
                 let targets: Vec<_> = (ids.iter().chain([&id]))
                     .map(|i| (&self.entries[i].target, seen.poses[i.fixed_part]))
@@ -373,22 +378,27 @@ impl<'a> Recogniser<'a> {
                     .all(|((t, _), m)| keeps(t, m, size));
                 fits.then_some(solution)
             };
-            let state = match together(&kept) {
-                Some(solution) if id.surfaces.is_none() && solution.freedom.count() == freedom.count() => {
-                    State::Redundant
-                }
+            let is_held = |solution: &Solution| {
+                let placed: Vec<_> = (beside.iter())
+                    .map(|k| (&self.entries[k].target, seen.poses[k.fixed_part]))
+                    .collect();
+                id.surfaces.is_none()
+                    && solve(&placed, pose, size).freedom.count() == solution.freedom.count()
+            };
+            let state = match together(&beside) {
+                Some(solution) if is_held(&solution) => State::Redundant,
                 Some(solution) => {
                     freedom = solution.freedom;
                     kept.push(id);
                     State::Active
                 }
                 None => {
-                    let alone: Vec<TargetId> = kept
+                    let alone: Vec<TargetId> = beside
                         .iter()
                         .copied()
                         .filter(|k| together(&[*k]).is_none())
                         .collect();
-                    State::Conflict(if alone.is_empty() { kept.clone() } else { alone })
+                    State::Conflict(if alone.is_empty() { beside } else { alone })
                 }
             };
             if let Some(entry) = self.entries.get_mut(&id) {
