@@ -17,7 +17,7 @@
 //!
 //! Each component is a row J of the step's scaled twist (v, ω·L) and an error e: e' = e + h·J·V'. The offset is taken between the moving point and
 //! the fixed feature, the angle as the sine of that between the directions. A path with a given turn has the whole rotation E from the goal's orientation
-//! to the part's as its angle, 2·vec E; on a screw the goal's orientation turns by c·s over the travel s, which adds −c·∂s to the row about the axis. That
+//! to the part's as its angle, sin θ about its axis; on a screw the goal's orientation turns by c·s over the travel s, which adds −c·∂s to the row about the axis. That
 //! row is divided by √(1 + (c·L)²): the torque's cap then bounds the force that the screw makes of it, too.
 
 use glam::{Quat, Vec3};
@@ -163,11 +163,10 @@ fn turned(axis: Vec3, angle: f32) -> Quat {
     exp(axis * (angle - TAU * libm::rintf(angle / TAU)))
 }
 
-/// Rotation from one orientation to another, 2·sin(θ/2) about its axis in the world's frame, θ at most π.
+/// Rotation by θ from one orientation to another, as sin θ about its axis in the world's frame: without a step where θ passes half a turn.
 fn rotation_between(from: Quat, to: Quat) -> Vec3 {
     let by = to * from.conjugate();
-    let double = if by.w < 0.0 { -2.0 } else { 2.0 };
-    Vec3::new(by.x, by.y, by.z) * double
+    Vec3::new(by.x, by.y, by.z) * (2.0 * by.w)
 }
 
 /// Two unit vectors across a unit vector and each other.

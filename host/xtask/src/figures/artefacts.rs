@@ -112,21 +112,6 @@ pub const ARTEFACTS: &[Artefact] = &[
         ],
     },
     Artefact {
-        name: "guidance",
-        made: Made::Page { quick: true },
-        sources: &[
-            LAW,
-            LOOP,
-            SCENARIO,
-            &[
-                "host/lab/src/figures/guidance",
-                "host/fit/src",
-                "host/guide/src",
-                "host/shapes/src",
-            ],
-        ],
-    },
-    Artefact {
         name: "stability",
         made: Made::Page { quick: true },
         sources: &[
