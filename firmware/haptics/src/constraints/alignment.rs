@@ -84,14 +84,7 @@ impl Alignment {
                     let goal =
                         turned(axis, rate * travel) * fixed.orientation * Quat::from_array(path.orientation);
                     let error = rotation_between(goal, object.orientation) * length;
-                    for n in [u, v] {
-                        angle.add([0.0, 0.0, 0.0, n.x, n.y, n.z], n.dot(error));
-                    }
-                    let coupled = slide(axis, arm, length).map(|x| -rate * length * x);
-                    let share = 1.0 / libm::sqrtf(1.0 + (rate * length) * (rate * length));
-                    let [x, y, z, a, b, c] = coupled;
-                    let row = [x, y, z, a + axis.x, b + axis.y, c + axis.z];
-                    angle.add(row.map(|x| share * x), share * axis.dot(error));
+                    angle.add_geared([u, v, axis], rate, slide(axis, arm, length), error, length);
                 }
             }
         }
@@ -117,6 +110,19 @@ impl Rows {
     fn add(&mut self, row: [f32; 6], error: f32) {
         // Three at most, the capacity.
         let _ = self.rows.push((row, error));
+    }
+
+    /// Adds the whole rotation by which a part is off (`error`, rad·L) about the last of three `axes`, the way's, and two across it: about the way it is to
+    /// turn by `rate` (rad/m) over the travel, whose row is `travels`; `length` is L.
+    fn add_geared(&mut self, axes: [Vec3; 3], rate: f32, travels: [f32; 6], error: Vec3, length: f32) {
+        let [u, v, axis] = axes;
+        for n in [u, v] {
+            self.add([0.0, 0.0, 0.0, n.x, n.y, n.z], n.dot(error));
+        }
+        let share = 1.0 / libm::sqrtf(1.0 + (rate * length) * (rate * length));
+        let [x, y, z, a, b, c] = travels.map(|x| -rate * length * x);
+        let row = [x, y, z, a + axis.x, b + axis.y, c + axis.z];
+        self.add(row.map(|x| share * x), share * axis.dot(error));
     }
 
     /// Length of the error after the twist `x` has acted for `ahead` s.
@@ -214,6 +220,23 @@ mod tests {
         }
     }
 
+    /// The path of which the object is nearly met at `object`, after the turn over its travel.
+    fn nearly_met(target: &ConstraintTarget, turn: PathTurn, object: &Pose, fixed: &Pose) -> Path {
+        let axis = fixed.transform_vector(Vec3::from_array(target.fixed.direction));
+        let on_axis = object.transform_point(Vec3::from_array(target.moving.point));
+        let travel = axis.dot(on_axis - fixed.transform_point(Vec3::from_array(target.fixed.point)));
+        let turned = match turn {
+            PathTurn::Free => Quat::IDENTITY,
+            PathTurn::Geared(rate) => Quat::from_axis_angle(axis.normalize(), -rate * travel),
+        };
+        let goal = Quat::from_rotation_x(2e-3) * turned * object.orientation;
+        Path {
+            orientation: (fixed.orientation.conjugate() * goal).normalize().to_array(),
+            turn,
+            ends: true,
+        }
+    }
+
     /// The rows are the errors' derivatives: a small motion along each unknown changes the errors as the rows predict.
     #[test]
     fn rows_are_derivatives() {
@@ -240,20 +263,7 @@ mod tests {
             .filter(|(kind, _)| *kind != ConstraintKind::Path);
         for (kind, turn) in others.chain(paths) {
             let mut t = target(kind);
-            t.path = turn.map(|turn| {
-                let on_axis = pose(center, orientation).transform_point(Vec3::from_array(t.moving.point));
-                let travel = axis.dot(on_axis - fixed.transform_point(Vec3::from_array(t.fixed.point)));
-                let turned = match turn {
-                    PathTurn::Free => Quat::IDENTITY,
-                    PathTurn::Geared(rate) => Quat::from_axis_angle(axis.normalize(), -rate * travel),
-                };
-                let goal = Quat::from_rotation_x(2e-3) * turned * orientation;
-                Path {
-                    orientation: (fixed.orientation.conjugate() * goal).normalize().to_array(),
-                    turn,
-                    ends: true,
-                }
-            });
+            t.path = turn.map(|turn| nearly_met(&t, turn, &pose(center, orientation), &fixed));
             assert_eq!(t.path.is_some(), kind == ConstraintKind::Path);
             let here = Alignment::of(&t, &pose(center, orientation), center, &fixed, length);
             for unknown in 0..6 {

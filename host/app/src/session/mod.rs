@@ -12,6 +12,7 @@ pub mod document;
 pub mod finding;
 pub mod fits;
 pub mod fitting;
+mod following;
 pub mod guidance;
 pub mod history;
 pub mod insertion;
