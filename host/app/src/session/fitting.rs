@@ -404,6 +404,9 @@ mod tests {
             smallest_clearance_mm: 0.0,
             corners_mm: Vec::new(),
             screw: Some((DVec3::new(1.0, 0.0, 0.0), 3.0)),
+            spin: None,
+            ends: true,
+            sliding: Vec::new(),
         };
         let seat = DVec3::new(2.0, 0.0, 0.0);
         let way = points(&path, seat);
