@@ -110,6 +110,7 @@ const VERBS: &[&str] = &[
     "Gather",
     "Generate",
     "Give",
+    "Go",
     "Group",
     "Grow",
     "Guard",
