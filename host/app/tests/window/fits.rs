@@ -159,7 +159,7 @@ fn a_held_part_is_guided_along_the_way_into_a_fit_that_is_chosen() {
     assert!(harness.state().session.follows_shown_fit());
     harness.run_steps(2);
     harness.get_by_label("Guide along the way in");
-    click(&mut harness, "Guide along the way in");
+    press(&mut harness, Key::G);
     assert!(!harness.state().session.follows_shown_fit());
     assert_eq!(harness.state().session.grabbed(), Some(1), "nothing else happens");
 }
