@@ -14,12 +14,15 @@ use crate::clearance::{
 use crate::error::TaskError;
 use crate::motion::Motion;
 use crate::skeleton::{Skeleton, skeleton};
+use crate::work::work;
 
 /// Overlap accepted beyond the one that the file's placements already have, mm: twice the default distance of a contact
 /// ([`Tolerances::linear_mm`]), so that resting faces slide.
 pub const ALLOWED_MM: f64 = 2e-3;
 /// Travel between two checks of samples in contact while searching, mm.
 pub const SEARCH_STEP_MM: f64 = 0.4;
+/// Work of a pair whose boxes show that it does not meet: that of a sweep, which visits the root of either tree.
+const FARTHER: u64 = 2;
 
 /// An assembly: its parts as placed in the file, prepared for queries. Lengths mm, poses from part to assembly.
 pub struct Assembly {
@@ -69,7 +72,7 @@ impl Assembly {
                 *slot = true;
             }
         }
-        let bodies: Vec<Option<Arc<Body>>> = (model.shapes.iter().zip(used))
+        let bodies: Vec<Option<Arc<Body>>> = (model.shapes.par_iter().zip(used).with_max_len(1))
             .map(|(shape, used)| used.then(|| Body::new(shape).map(Arc::new)).flatten())
             .collect();
         for part in &model.parts {
@@ -94,12 +97,21 @@ impl Assembly {
             merged,
             pressed_mm: vec![0.0; count * count],
         };
-        for a in 0..count {
-            for b in a + 1..count {
-                let depth = assembly.pair_gap(a, b, 0.0).map_or(0.0, |gap| -gap.distance_mm);
-                assembly.pressed_mm[a * count + b] = depth;
-                assembly.pressed_mm[b * count + a] = depth;
-            }
+        let boxes: Vec<(DVec3, DVec3)> = (0..count)
+            .map(|part| assembly.bounds(part, DAffine3::IDENTITY))
+            .collect();
+        let meet = |a: usize, b: usize| {
+            let ((al, ah), (bl, bh)) = (boxes[a], boxes[b]);
+            (al - bh).max(bl - ah).max_element() <= 0.0
+        };
+        let pairs = (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b)));
+        let pairs: Vec<(usize, usize)> = pairs.filter(|&(a, b)| meet(a, b)).collect();
+        let depths: Vec<f64> = (pairs.par_iter().with_max_len(1))
+            .map(|&(a, b)| assembly.pair_gap(a, b, 0.0).map_or(0.0, |gap| -gap.distance_mm))
+            .collect();
+        for ((a, b), depth) in pairs.into_iter().zip(depths) {
+            assembly.pressed_mm[a * count + b] = depth;
+            assembly.pressed_mm[b * count + a] = depth;
         }
         Ok(assembly)
     }
@@ -223,6 +235,16 @@ impl Assembly {
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (l, h)| {
                 (low.min(l), high.max(h))
             })
+    }
+
+    /// A box in which several parts moved by `by` stay on a motion.
+    pub(crate) fn swept(&self, parts: &[usize], by: DAffine3, motion: &Motion) -> (DVec3, DVec3) {
+        let (low, high) = self.bounds_of(parts, by);
+        if motion.angle == 0.0 {
+            return (low.min(low + motion.slide), high.max(high + motion.slide));
+        }
+        let reach = motion.speed(motion.arm((low + high) / 2.0) + low.distance(high) / 2.0);
+        (low - reach, high + reach)
     }
 
     /// Least distance of two parts as placed where it is below `within`.
@@ -396,9 +418,16 @@ impl Assembly {
         let mut share = 1.0;
         let mut pair = None;
         for &a in group.parts {
+            let (al, ah) = self.swept(&[a], group.by, &motion);
             for &b in others {
+                let allow_mm = self.allowed_mm(a, b) - margin;
+                let (bl, bh) = self.bounds(b, DAffine3::IDENTITY);
+                if (al - bh).max(bl - ah).max_element() > (-allow_mm).max(0.0) {
+                    work(FARTHER);
+                    continue;
+                }
                 let limits = Limits {
-                    allow_mm: self.allowed_mm(a, b) - margin,
+                    allow_mm,
                     step_mm,
                     coarse,
                 };

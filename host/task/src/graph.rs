@@ -3,6 +3,8 @@
 //! A connection is read from geometry: contacts ([`mortise_mating::identify`]) and fits, a shaft in a bore with a small difference of radii whose faces lie
 //! side by side without touching. Its kind follows from the clearance's sign and from threads; what no geometry states (welded, glued) is not guessed.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_mating::{ContactKind, Side};
@@ -73,13 +75,26 @@ pub struct Edge {
 }
 
 /// The graph of an assembly; nodes carry the part's index.
+///
+/// Cost: a comparison of each shaft with each bore of other parts, and the triangles of the parts of those that share an axis.
 pub fn graph(assembly: &Assembly) -> UnGraph<usize, Edge> {
     let count = assembly.count();
     let mut graph = UnGraph::new_undirected();
     let nodes: Vec<NodeIndex> = (0..count).map(|p| graph.add_node(p)).collect();
+    let rounds: Vec<Rounds> = (0..count).map(|p| Rounds::of(assembly, p)).collect();
+    let mut contacts: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
+    for (i, contact) in assembly.contacts.iter().enumerate() {
+        contacts.entry(contact.parts).or_default().push(i);
+    }
     for a in 0..count {
         for b in a + 1..count {
-            if let Some(edge) = edge(assembly, a, b) {
+            let contacts = contacts.remove(&[a, b]).unwrap_or_default();
+            let fits = [
+                fits(assembly, &rounds[a], &rounds[b]),
+                fits(assembly, &rounds[b], &rounds[a]),
+            ]
+            .concat();
+            if let Some(edge) = edge(assembly, [a, b], contacts, fits) {
                 graph.add_edge(nodes[a], nodes[b], edge);
             }
         }
@@ -87,13 +102,7 @@ pub fn graph(assembly: &Assembly) -> UnGraph<usize, Edge> {
     graph
 }
 
-fn edge(assembly: &Assembly, a: usize, b: usize) -> Option<Edge> {
-    let contacts: Vec<usize> = (assembly.contacts.iter().enumerate())
-        .filter(|(_, c)| c.parts == [a, b])
-        .map(|(i, _)| i)
-        .collect();
-    let mut fits = fits(assembly, a, b);
-    fits.extend(self::fits(assembly, b, a));
+fn edge(assembly: &Assembly, [a, b]: [usize; 2], contacts: Vec<usize>, fits: Vec<Fit>) -> Option<Edge> {
     let pressed = assembly.pressed_mm(a, b) > PRESSED_MM;
     if contacts.is_empty() && fits.is_empty() && !pressed {
         return None;
@@ -176,53 +185,80 @@ pub fn helical(assembly: &Assembly, part: usize) -> bool {
         })
 }
 
-/// Shafts of `a` in bores of `b`.
-fn fits(assembly: &Assembly, a: usize, b: usize) -> Vec<Fit> {
-    let mut found = Vec::new();
-    let (pa, pb) = (assembly.placement(a), assembly.placement(b));
-    for (i, shaft) in assembly
-        .surfaces(a)
-        .iter()
-        .enumerate()
-        .filter(|(_, m)| m.side == Side::Convex)
-    {
-        let Surface::Cylinder { frame: f, radius: r } = shaft.surface else {
-            continue;
+/// A merged cylinder of a part, in the assembly's frame.
+struct Round {
+    /// Its place in [`Assembly::surfaces`].
+    surface: usize,
+    radius: f64,
+    origin: DVec3,
+    axis: DVec3,
+}
+
+/// The shafts and bores of a part.
+struct Rounds {
+    part: usize,
+    shafts: Vec<Round>,
+    bores: Vec<Round>,
+}
+
+impl Rounds {
+    fn of(assembly: &Assembly, part: usize) -> Self {
+        let place = assembly.placement(part);
+        let mut found = Self {
+            part,
+            shafts: Vec::new(),
+            bores: Vec::new(),
         };
-        for (j, bore) in assembly
-            .surfaces(b)
-            .iter()
-            .enumerate()
-            .filter(|(_, m)| m.side == Side::Concave)
-        {
-            let Surface::Cylinder { frame: g, radius } = bore.surface else {
+        for (surface, merged) in assembly.surfaces(part).iter().enumerate() {
+            let Surface::Cylinder { frame, radius } = merged.surface else {
                 continue;
             };
-            let clearance = radius - r;
+            let round = Round {
+                surface,
+                radius,
+                origin: place.transform_point3(frame.origin),
+                axis: place.transform_vector3(frame.z),
+            };
+            match merged.side {
+                Side::Convex => found.shafts.push(round),
+                Side::Concave => found.bores.push(round),
+                Side::Flat => {}
+            }
+        }
+        found
+    }
+}
+
+/// Shafts of `a` in bores of `b`.
+fn fits(assembly: &Assembly, a: &Rounds, b: &Rounds) -> Vec<Fit> {
+    let mut found = Vec::new();
+    for shaft in &a.shafts {
+        for bore in &b.bores {
+            let clearance = bore.radius - shaft.radius;
             if !(-PRESS_MM..=FIT_MM).contains(&clearance) {
                 continue;
             }
-            let (o, z) = (pa.transform_point3(f.origin), pa.transform_vector3(f.z));
-            let (p, w) = (pb.transform_point3(g.origin), pb.transform_vector3(g.z));
-            let apart = (p - o).reject_from_normalized(z).length();
-            if z.cross(w).length() > COAXIAL_RAD || apart > clearance.abs() + 1e-3 {
+            let (o, z) = (shaft.origin, shaft.axis);
+            let apart = (bore.origin - o).reject_from_normalized(z).length();
+            if z.cross(bore.axis).length() > COAXIAL_RAD || apart > clearance.abs() + 1e-3 {
                 continue;
             }
-            let (Some(s), Some(t)) = (
-                extent(assembly, a, &shaft.faces, o, z),
-                extent(assembly, b, &bore.faces, o, z),
-            ) else {
+            let along = |rounds: &Rounds, round: &Round| {
+                let faces = &assembly.surfaces(rounds.part)[round.surface].faces;
+                extent(assembly, rounds.part, faces, o, z)
+            };
+            let (Some(s), Some(t)) = (along(a, shaft), along(b, bore)) else {
                 continue;
             };
             let (low, high) = (s[0].max(t[0]), s[1].min(t[1]));
             if high - low > COMMON_MM {
                 let center = o + z * ((low + high) / 2.0);
                 found.push(Fit {
-                    parts: [a, b],
-                    surfaces: [i, j],
+                    parts: [a.part, b.part],
+                    surfaces: [shaft.surface, bore.surface],
                     center,
                     axis: z,
-                    radius_mm: r,
+                    radius_mm: shaft.radius,
                     clearance_mm: clearance,
                     length_mm: high - low,
                 });
