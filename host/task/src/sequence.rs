@@ -10,6 +10,7 @@
 use std::time::{Duration, Instant};
 
 use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Clearance, Moved};
 use crate::blocking::Blocking;
@@ -118,14 +119,12 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequen
         }
     }
     let end = start + time;
-    for step in &mut found.steps {
-        if Instant::now() >= end {
-            break;
-        }
-        if let Some(least) = measure(assembly, step, end) {
-            step.least = least;
-            step.measured = true;
-        }
+    let measured: Vec<Option<Option<Clearance>>> = (found.steps.par_iter().with_max_len(1))
+        .map(|step| measure(assembly, step, end))
+        .collect();
+    for (step, least) in found.steps.iter_mut().zip(measured) {
+        step.measured = least.is_some();
+        step.least = least.flatten();
     }
     found.time = start.elapsed();
     found
@@ -144,7 +143,7 @@ fn split(
             .filter(|p| !group.contains(p))
             .collect::<Vec<_>>()
     };
-    if let Some(leaving) = blocking.leaving(set, until).into_iter().next() {
+    if let Some(leaving) = blocking.leaving(set, until) {
         let onto = rest(&leaving.parts);
         let moved = Moved {
             parts: &leaving.parts,
@@ -240,23 +239,26 @@ fn pairs(assembly: &Assembly, set: &[usize]) -> Vec<Vec<usize>> {
 }
 
 /// Least distance on a step's way in, with the descent between samples at its narrowest place; the outer `None` when it is not measured by `until`.
+///
+/// Cost: a sweep against each part whose box is as near to the swept box of the group as the least distance found.
 pub fn measure(assembly: &Assembly, step: &Step, until: Instant) -> Option<Option<Clearance>> {
     let (mut by, path) = step.path.reversed();
     let mut least: Option<Clearance> = None;
     let mut at = by;
     for leg in &path.legs {
-        for part in &step.onto {
+        let moved = Moved {
+            parts: &step.group,
+            by,
+        };
+        for (bound, part) in nearest_first(assembly, &moved, &step.onto, leg) {
             if Instant::now() >= until {
                 return None;
             }
-            let moved = Moved {
-                parts: &step.group,
-                by,
-            };
             let within = least.map_or(FAR_MM, |l| l.gap.distance_mm);
-            if let Some((t, found)) =
-                assembly.least_over(&moved, std::slice::from_ref(part), leg, MEASURE_STEP_MM, within)
-            {
+            if bound >= within {
+                break;
+            }
+            if let Some((t, found)) = assembly.least_over(&moved, &[part], leg, MEASURE_STEP_MM, within) {
                 least = Some(found);
                 at = leg.at(t) * by;
             }
@@ -273,4 +275,30 @@ pub fn measure(assembly: &Assembly, step: &Step, until: Instant) -> Option<Optio
             .or(least);
     }
     Some(least)
+}
+
+/// Distance below which boxes may meet, mm: their rounding.
+const BOXES_MM: f64 = 1e-6;
+
+/// Of `others` each with a lower bound of its distance from a group on a leg, mm: that of their boxes, none where these meet. Least bound first, equal ones
+/// in the given order.
+fn nearest_first(
+    assembly: &Assembly,
+    group: &Moved<'_>,
+    others: &[usize],
+    leg: &Motion,
+) -> Vec<(f64, usize)> {
+    let (low, high) = assembly.swept(group.parts, group.by, leg);
+    let bound = |part: usize| {
+        let (l, h) = assembly.bounds(part, DAffine3::IDENTITY);
+        let apart = (low - h).max(l - high).max(DVec3::ZERO).length();
+        if apart > BOXES_MM {
+            apart
+        } else {
+            f64::NEG_INFINITY
+        }
+    };
+    let mut found: Vec<(f64, usize)> = others.iter().map(|&part| (bound(part), part)).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found
 }
