@@ -4,7 +4,10 @@
 mod assembly_file;
 mod checked;
 mod extraction;
+mod generated;
+mod large;
 mod sequences;
+mod solids;
 mod words;
 
 use super::{Plan, Row};
@@ -15,6 +18,7 @@ const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to thei
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     sequences::own(out)?;
+    large::measure(plan, out)?;
     let Some(cad) = corpus::folder() else {
         for what in [
             "tasks of extraction",
