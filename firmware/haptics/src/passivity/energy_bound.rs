@@ -37,9 +37,11 @@
 //! by the factor e in each (A·h² + u)/v, 4 ms at 6 mm/s without counts; what comes and goes with the sense of the motion is no more than 0.01 N (k is
 //! 400 N/m here).
 //!
-//! Without targets the account is only kept, and the tick's output is the same to the bit as without it. Then the coupling is passive by itself and
-//! the valve of the tank limits it; B falls no lower than to the reserve. The slip recovers at once where neither target nor contact acts on the part, which
-//! then has nothing to push the hand from. A negative B remains owed: a grab or a fault does not cancel it, only work by the operator does.
+//! A part that a target has set in motion still carries that energy when the target has ended. So both measures act on until the energy stored exceeds
+//! the credit by less than the budget. From then on the account is only kept, and the tick's output is the same to the bit as without it: the coupling is
+//! passive by itself and the valve of the tank limits it; B falls no lower than to the reserve. The slip recovers at once where neither target nor contact
+//! acts on the part, which then has nothing to push the hand from. A negative B remains owed: a grab or a fault does not cancel it, only work by the
+//! operator does.
 //!
 //! The account is that of Ferraguti, Secchi and Fantuzzi, ICRA 2013 (see [`super::tank`]); slip in place of a softer spring is ours. Cost: 20
 //! instructions without targets, about 350 with.
@@ -87,8 +89,10 @@ pub(crate) struct EnergyBound {
     slip: Twist,
     /// The wrench that last acted on the handle.
     acted: Wrench,
-    /// There are targets, or a slip has not recovered yet.
+    /// There are targets, or what they brought about has not ended: a slip, or a motion that the credit does not cover.
     active: bool,
+    /// More is stored than the credit and the budget.
+    uncovered: bool,
 }
 
 impl EnergyBound {
@@ -99,6 +103,7 @@ impl EnergyBound {
             slip: Twist::ZERO,
             acted: Wrench::ZERO,
             active: false,
+            uncovered: false,
         }
     }
 
@@ -165,7 +170,7 @@ impl EnergyBound {
     ) {
         let initial = settings.passivity.initial_budget_j;
         let held_firmly = self.slip == Twist::ZERO;
-        self.active = hold == Hold::Targets || !held_firmly;
+        self.active = hold == Hold::Targets || !held_firmly || (self.active && self.uncovered);
         if !self.active {
             return;
         }
@@ -201,13 +206,14 @@ impl EnergyBound {
         }
     }
 
-    /// Limits the credit to the energy still `stored` (J): the rest is dissipated.
-    pub fn keep(&mut self, stored: f32) {
+    /// Limits the credit to the energy still `stored` (J): the rest is dissipated. `initial` is the budget E₀, J.
+    pub fn keep(&mut self, stored: f32, initial: f32) {
         self.credit_j = if self.credit_j < stored {
             self.credit_j
         } else {
             stored
         };
+        self.uncovered = stored - self.credit_j > (1.0 - RESERVE) * initial;
     }
 
     /// `wrench`, scaled down so that its work until the next tick is covered, whatever the operator does. `motion` is the measured twist of the
@@ -348,7 +354,7 @@ mod tests {
                 1.0,
                 settings,
             );
-            bound.keep(stored);
+            bound.keep(stored, settings.passivity.initial_budget_j);
             let wanted = Wrench {
                 force: -settings.coupling.k_t_n_per_m * coupling.stretch,
                 torque: Vec3::ZERO,
@@ -399,5 +405,34 @@ mod tests {
         assert!(given <= reserve(&settings), "{given} J");
         let mut bound = spent(&settings);
         assert_eq!(moved(&mut bound, &settings, 100, |_| 0.0), (0.0, 0.0), "at rest");
+    }
+
+    /// A target that ends leaves the part in motion, with energy that nobody supplied: once 82 µJ of it reached a moving hand.
+    #[test]
+    fn the_bound_holds_after_a_target_until_its_energy_is_spent() {
+        let settings = settings();
+        let initial = settings.passivity.initial_budget_j;
+        let mut bound = spent(&settings);
+        let along = Twist {
+            linear: Vec3::X * 0.1,
+            angular: Vec3::ZERO,
+        };
+        let push = Wrench {
+            force: Vec3::X,
+            torque: Vec3::ZERO,
+        };
+        let mut passes = |hold, moving_j| {
+            let (mut coupling, mut stored) = (Coupling::stretched(Vec3::ZERO, Vec3::ZERO), 0.0);
+            bound.slip_to_bound(&mut coupling, &mut stored, Quat::IDENTITY, hold, 1.0, &settings);
+            bound.keep(stored + moving_j, initial);
+            bound.bound(push, &[], along, &settings) == push
+        };
+        assert!(passes(Hold::Nothing, 1e-3), "no target yet");
+        assert!(!passes(Hold::Targets, 1e-3));
+        for hold in [Hold::Nothing, Hold::Contacts, Hold::Nothing] {
+            assert!(!passes(hold, 1e-3), "{hold:?}");
+        }
+        assert!(!passes(Hold::Nothing, 0.0), "spent within this tick");
+        assert!(passes(Hold::Nothing, 1e-3));
     }
 }

@@ -166,9 +166,9 @@ impl EnergyTank {
     }
 
     /// See [`EnergyBound::keep`]; `moving` is the energy of the object's motion, J.
-    pub fn keep(&mut self, moving: f32) {
+    pub fn keep(&mut self, moving: f32, initial: f32) {
         self.energy_bound
-            .keep((1.0 - self.status.softened) * self.stored + moving);
+            .keep((1.0 - self.status.softened) * self.stored + moving, initial);
     }
 
     /// See [`EnergyBound::bound`].
