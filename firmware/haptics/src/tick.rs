@@ -143,7 +143,8 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     let mut springs = Vec::new();
     hand.targets.add_springs(&situation, &mut springs);
     let turning_j = grabbed.turning_energy(step.mass_kg, step.gyration2);
-    hand.tank.keep(coupled.moving_j + turning_j, settings.passivity.initial_budget_j);
+    hand.tank
+        .keep(coupled.moving_j + turning_j, settings.passivity.initial_budget_j);
     let constrained = (
         CouplingForce::new(coupling, &settings.coupling, period_s, length),
         TargetForce::new(&springs, period_s, length),
