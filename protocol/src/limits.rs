@@ -7,7 +7,7 @@ pub const MAX_FRAME: usize = MAX_MESSAGE + 2 + 8 + 4 + (MAX_MESSAGE + 14).div_ce
 /// Scene bytes per chunk.
 pub const MAX_CHUNK: usize = 512;
 /// Parts per scene.
-pub const MAX_PARTS: usize = 256;
+pub const MAX_PARTS: usize = 512;
 /// Touching face pairs per telemetry message, deepest first.
 pub const MAX_PAIRS: usize = 12;
 /// Constraint targets active at the same time.

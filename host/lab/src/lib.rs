@@ -24,6 +24,7 @@ pub mod experiments;
 pub mod figures;
 pub mod fit;
 mod followed;
+mod generated;
 mod guided;
 pub mod hybrid;
 mod least_distance;

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 use mortise_bake::{
-    BakeOptions, BakeReport, ExactSurface, Grabbable, PointshellOptions, bake, sample_pointshell,
+    BakeError, BakeOptions, BakeReport, ExactSurface, Grabbable, PointshellOptions, Request, bake, plan,
+    sample_pointshell,
 };
 use mortise_brep::{CadModel, load_step};
 use mortise_guide::{Guide, GuideSettings};
@@ -86,32 +87,45 @@ impl PreparedScene {
         part: &str,
         options: &BakeOptions,
     ) -> Result<Self, ScenarioError> {
-        let name = || step.display().to_string();
-        if !model.parts.iter().any(|known| known.name == part) {
-            let known: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
-            return Err(ScenarioError::NoSuchPart {
-                step: name(),
-                part: part.to_owned(),
-                known: known.join(", "),
-            });
-        }
-        let baked = bake(&model, options, &|_| ControlFlow::Continue(()))
-            .map_err(|source| ScenarioError::Bake { step: name(), source })?;
-        let index = baked.report.parts.iter().position(|baked| baked.name == part);
+        named(step, &model, part)?;
+        let baked =
+            bake(&model, options, &|_| ControlFlow::Continue(())).map_err(|source| refused(step, source))?;
+        Self::of_image(step, model, part, baked.image, baked.report)
+    }
+
+    /// As [`Self::bake`], but planned: the smallest image within `request`'s accuracy.
+    ///
+    /// # Errors
+    /// `Bake`, `NoSuchPart`.
+    pub fn plan(step: &Path, model: CadModel, part: &str, request: &Request) -> Result<Self, ScenarioError> {
+        named(step, &model, part)?;
+        let planned =
+            plan(&model, request, &|_| ControlFlow::Continue(())).map_err(|source| refused(step, source))?;
+        Self::of_image(step, model, part, planned.image, planned.plan.report)
+    }
+
+    fn of_image(
+        step: &Path,
+        model: CadModel,
+        part: &str,
+        image: Vec<u8>,
+        report: BakeReport,
+    ) -> Result<Self, ScenarioError> {
+        let index = report.parts.iter().position(|baked| baked.name == part);
         let Some(index) = index.and_then(|index| u16::try_from(index).ok()) else {
             return Err(ScenarioError::NoSuchPart {
-                step: name(),
+                step: step.display().to_string(),
                 part: part.to_owned(),
                 known: "parts, but this one has no surface".into(),
             });
         };
-        let bodies = (baked.report.parts.iter())
+        let bodies = (report.parts.iter())
             .map(|baked| Body::of(&model, baked.model_part))
             .collect();
         Ok(Self {
-            image: baked.image,
+            image,
             model,
-            report: baked.report,
+            report,
             part: index,
             bodies,
             closed_form: None,
@@ -151,6 +165,26 @@ impl PreparedScene {
     /// Index in the image of the part of this name.
     pub fn part_named(&self, name: &str) -> Option<usize> {
         self.report.parts.iter().position(|part| part.name == name)
+    }
+}
+
+/// Refuses a model that has no part of this name.
+fn named(step: &Path, model: &CadModel, part: &str) -> Result<(), ScenarioError> {
+    if model.parts.iter().any(|known| known.name == part) {
+        return Ok(());
+    }
+    let known: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
+    Err(ScenarioError::NoSuchPart {
+        step: step.display().to_string(),
+        part: part.to_owned(),
+        known: known.join(", "),
+    })
+}
+
+fn refused(step: &Path, source: BakeError) -> ScenarioError {
+    ScenarioError::Bake {
+        step: step.display().to_string(),
+        source,
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use crate::row::Row;
+
 /// How a table is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
@@ -13,4 +15,15 @@ pub struct Plan<'a> {
     pub pair: &'a Path,
     /// One part of the table alone, where it has parts.
     pub only: Option<&'a str>,
+}
+
+impl Plan<'_> {
+    /// A time: judged in the full form alone, since the shorter one runs beside other programs.
+    pub(crate) fn timed(&self, what: String, seconds: f64, most: f64) -> Row {
+        if self.quick {
+            Row::reported(what, seconds, "s").varies()
+        } else {
+            Row::at_most(what, seconds, "s", most).varies()
+        }
+    }
 }

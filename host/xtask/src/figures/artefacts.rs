@@ -142,7 +142,7 @@ pub const ARTEFACTS: &[Artefact] = &[
     Artefact {
         name: "plan",
         made: Made::Page { quick: true },
-        sources: &[LAW, &["host/lab/src/figures/planning.rs"]],
+        sources: &[LAW, &["host/lab/src/figures/planning", "host/lab/src/generated"]],
     },
     Artefact {
         name: "assemble",
@@ -154,6 +154,7 @@ pub const ARTEFACTS: &[Artefact] = &[
                 "host/task/src",
                 "host/words/src",
                 "host/lab/src/figures/assemble",
+                "host/lab/src/generated",
             ],
         ],
     },

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use mortise_task::removal::{Budget, Removal, remove};
 
-use super::assembly_file::{load, timed};
+use super::assembly_file::load;
 use super::checked::{Checked, Overlap};
 use crate::LabError;
 use crate::figures::{Plan, Row};
@@ -64,7 +64,7 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
             }
         }
         let what = format!("{name}, {runs} runs: median time to a way out");
-        out(timed(plan, what, median(times.into_iter()), MEDIAN_S));
+        out(plan.timed(what, median(times.into_iter()), MEDIAN_S));
     }
     let tasks = format!("{} tasks of extraction, {runs} runs each", TASKS.len());
     let all = TASKS.len() as f64 * runs as f64;
@@ -94,7 +94,7 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
             held_um,
         ));
         let what = format!("{name}: time to the proof");
-        out(timed(plan, what, start.elapsed().as_secs_f64(), MEDIAN_S));
+        out(plan.timed(what, start.elapsed().as_secs_f64(), MEDIAN_S));
     }
     Ok(())
 }

@@ -5,10 +5,9 @@ use std::time::{Duration, Instant};
 use mortise_task::graph::graph;
 use mortise_task::{Assembly, sequence};
 
-use super::assembly_file::{refused, timed};
-use super::generated;
-use crate::LabError;
+use super::assembly_file::refused;
 use crate::figures::{Plan, Row};
+use crate::{LabError, generated};
 
 /// Number of parts in the full and in the shorter form.
 const PARTS: usize = 500;
@@ -30,18 +29,13 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     let start = Instant::now();
     let model = mortise_brep::load_step(file.path())?;
     let seconds = start.elapsed().as_secs_f64();
-    out(timed(plan, format!("{what}: time to open it"), seconds, OPEN_S));
+    out(plan.timed(format!("{what}: time to open it"), seconds, OPEN_S));
 
     let start = Instant::now();
     let assembly = Assembly::new(model).map_err(|error| refused(file.path(), &error))?;
     let graph = graph(&assembly);
     let seconds = start.elapsed().as_secs_f64();
-    out(timed(
-        plan,
-        format!("{what}: time to its connection graph"),
-        seconds,
-        GRAPH_S,
-    ));
+    out(plan.timed(format!("{what}: time to its connection graph"), seconds, GRAPH_S));
     out(Row::exactly(
         format!("{what}: connections"),
         graph.edge_count() as f64,
@@ -53,12 +47,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     let all: Vec<usize> = (0..assembly.count()).collect();
     let found = sequence::disassemble(&assembly, &all, Duration::from_secs_f64(SEQUENCE_S));
     let seconds = start.elapsed().as_secs_f64();
-    out(timed(
-        plan,
-        format!("{what}: time to its sequence"),
-        seconds,
-        SEQUENCE_S,
-    ));
+    out(plan.timed(format!("{what}: time to its sequence"), seconds, SEQUENCE_S));
     let whole = found.complete() && found.steps.iter().all(|step| step.measured);
     out(Row::same(
         format!("{what}: comes apart, every step measured"),

@@ -4,10 +4,8 @@
 mod assembly_file;
 mod checked;
 mod extraction;
-mod generated;
 mod large;
 mod sequences;
-mod solids;
 mod words;
 
 use super::{Plan, Row};

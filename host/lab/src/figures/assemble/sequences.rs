@@ -7,7 +7,7 @@ use mortise_task::report::{self, Sense};
 use mortise_task::{Assembly, sequence};
 use serde::Deserialize;
 
-use super::assembly_file::{load, refused, timed};
+use super::assembly_file::{load, refused};
 use super::checked::{Checked, Overlap};
 use super::extraction::overlaps;
 use crate::LabError;
@@ -124,12 +124,7 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
             "constraints",
             order.constraints.len() as f64,
         ));
-        out(timed(
-            plan,
-            format!("{name}: time to its sequence"),
-            seconds,
-            LONGEST_S,
-        ));
+        out(plan.timed(format!("{name}: time to its sequence"), seconds, LONGEST_S));
         let overlap = (found.steps.iter())
             .map(|step| checked.overlap(&step.group, &step.onto, &step.path))
             .fold(Overlap::default(), Overlap::and);
@@ -158,12 +153,7 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
             format!("{file}, {} parts: verdict", assembly.count()),
             &verdict,
         ));
-        out(timed(
-            plan,
-            format!("{file}: time to its sequence"),
-            seconds,
-            LONGEST_S,
-        ));
+        out(plan.timed(format!("{file}: time to its sequence"), seconds, LONGEST_S));
     }
     Ok(())
 }

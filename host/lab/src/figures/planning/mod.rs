@@ -1,5 +1,7 @@
 //! Planning: the smallest image for an accuracy, in bounded time, and what it states against what is measured.
 
+mod hundreds;
+
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -43,6 +45,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     scene_p(out)?;
     random_fits(plan, out)?;
     motor(plan, out)?;
+    hundreds::measure(plan, out)?;
     real_files(plan, out)
 }
 
@@ -192,16 +195,8 @@ fn motor(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         if first.met { "yes" } else { "no" },
         "yes",
     ));
-    // Times are reported, not judged, in the shorter form: it runs beside other programs.
-    let timed = |what: String, value: f64, most: f64| {
-        if plan.quick {
-            Row::reported(what, value, "s").varies()
-        } else {
-            Row::at_most(what, value, "s", most).varies()
-        }
-    };
-    out(timed(what("time without a cache"), cold, MOTOR_COLD_S));
-    out(timed(what("time when nothing changed"), again, MOTOR_AGAIN_S));
+    out(plan.timed(what("time without a cache"), cold, MOTOR_COLD_S));
+    out(plan.timed(what("time when nothing changed"), again, MOTOR_AGAIN_S));
     Ok(())
 }
 

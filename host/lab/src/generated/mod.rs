@@ -4,13 +4,15 @@
 //! Two bolts with washers hold it on the base, in tapped holes of the bolts' own diameter; two bolts with washers and nuts hold a cover on its upright leg.
 //! Parts that no further bracket can be made of are pins in the base, in the corners between cells. All of a kind share one shape.
 
+mod solids;
+
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DAffine3, DVec2, DVec3, dvec2, dvec3};
 use mortise_brep::{LoadOptions, Part, load_step, write};
 use tempfile::NamedTempFile;
 
-use super::solids::Bore;
+use self::solids::Bore;
 use crate::LabError;
 use crate::guided;
 use crate::step_text::StepText;
@@ -87,7 +89,7 @@ struct Layout {
 ///
 /// # Errors
 /// A file that cannot be written or read.
-pub(super) fn file(count: usize, seed: u64) -> Result<NamedTempFile, LabError> {
+pub(crate) fn file(count: usize, seed: u64) -> Result<NamedTempFile, LabError> {
     let layout = Layout::new(count, seed);
     let mut text = StepText::new();
     for (kind, name) in Kind::ALL {
@@ -116,7 +118,7 @@ pub(super) fn file(count: usize, seed: u64) -> Result<NamedTempFile, LabError> {
 }
 
 /// Number of pairs of parts that touch or fit in an assembly of `count` parts.
-pub(super) fn connections(count: usize) -> usize {
+pub(crate) fn connections(count: usize) -> usize {
     let others = count.saturating_sub(1);
     let (brackets, pins) = (others / PER_BRACKET, others % PER_BRACKET);
     PAIRS * brackets + pins
