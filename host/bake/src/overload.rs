@@ -3,6 +3,8 @@
 //! A tick that cannot look at all points near takes every second, fourth or eighth of them, and the error bound of the pointshell grows by a factor of four
 //! at each step.
 
+use std::collections::HashSet;
+
 use mortise_protocol::parameter::ParameterId;
 
 use crate::distance::ExactSurface;
@@ -25,7 +27,7 @@ pub(crate) fn round_fits(scene: &Scene, prepared: &[ExactSurface]) -> Vec<((usiz
         .collect()
 }
 
-/// One warning for each part that may be grabbed and can need more than the default budget, at a depth that matters. `ticks` are those of `counted`.
+/// One warning for each shape whose parts may be grabbed and can need more than the default budget, at a depth that matters. `ticks` are those of `counted`.
 pub(crate) fn overloads(
     counted: &Ticks<'_>,
     ticks: &[PartTick],
@@ -41,10 +43,14 @@ pub(crate) fn overloads(
     let budget = f64::from(ParameterId::PointBudget.row().default);
     let cell = |shape: usize| f64::from(made.fields[shape].record.cell) * 1000.0;
     let epsilon = |shape: usize| each[shape].epsilon_mm.unwrap_or(cell(shape) / EPSILON_PER_CELL);
+    let mut warned = HashSet::new();
     let warning = |tick: &PartTick| {
         let times = tick.cost.lookups as f64 / budget;
         let is_own = |part: &&(usize, usize)| counted.model.parts[part.0].name == tick.name;
         let &(_, own) = scene.parts.iter().find(is_own).filter(|_| times > 1.0)?;
+        if !warned.insert(own) {
+            return None;
+        }
         let shapes = scene.met_by(own).into_iter().chain([own]);
         let bound = shapes.map(epsilon).fold(0.0, f64::max);
         if bound * 4f64.powf(times.log2().ceil()) <= DEEP_MM {
@@ -53,8 +59,13 @@ pub(crate) fn overloads(
         let place = crowded(counted.fits, own, made).map_or_else(String::new, |[x, y, z]| {
             format!(", most of them on one of its faces, at {x:.2} {y:.2} {z:.2} mm")
         });
+        let equal = scene.parts.iter().filter(|&&(_, shape)| shape == own).count();
+        let others = match equal {
+            1 => String::new(),
+            equal => format!(" and {} of the same shape", equal - 1),
+        };
         Some(format!(
-            "part \"{}\": {} points are near where it sits in what it fits or lies flat{place}; a tick needs {} field queries for them, more than its \
+            "part \"{}\"{others}: {} points are near where it sits in what it fits or lies flat{place}; a tick needs {} field queries for them, more than its \
              budget of {budget}, and leaves points out, so that contact there may be deeper by over {:.0} µm; a coarser accuracy, or larger cells, \
              has fewer points",
             tick.name,

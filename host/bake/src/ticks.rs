@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use mortise_brep::{CadModel, Surface};
 
 use crate::cost::TickCost;
@@ -27,24 +28,31 @@ impl Ticks<'_> {
     /// points near.
     pub fn of(&self, made: &Made) -> Vec<PartTick> {
         let scene = self.scene;
-        let counts: Vec<FacePoints> = made.shells.iter().map(FacePoints::of).collect();
+        let counts: Vec<FacePoints> = (made.shells.iter().zip(&self.surfaces))
+            .map(|(shell, surface)| FacePoints::of(shell, surface))
+            .collect();
         let flats: Vec<usize> = (0..counts.len()).map(|i| self.flats(&counts, i)).collect();
+        // Parts of one shape meet the same shapes.
+        let mut of_shape: Vec<Option<TickCost>> = vec![None; counts.len()];
         let mut ticks: Vec<PartTick> = (0..scene.parts.len())
             .filter(|&i| scene.grabbable[i])
             .map(|i| {
                 let (part, own) = scene.parts[i];
-                let met: Vec<usize> = (0..scene.parts.len())
-                    .filter(|&j| j != i)
-                    .map(|j| scene.parts[j].1)
-                    .collect();
-                // On a larger flat at most as much of its border is near as of the smaller one's.
-                let flat = met.iter().map(|&other| 2 * flats[own].min(flats[other])).max();
-                let all = made.shells[own].points.len()
-                    + met.iter().map(|&o| made.shells[o].points.len()).sum::<usize>();
-                let near = self.fitted(&counts, own, &met).max(flat.unwrap_or(0)).min(all);
+                let cost = *of_shape[own].get_or_insert_with(|| {
+                    let met: Vec<usize> = (0..scene.parts.len())
+                        .filter(|&j| j != i)
+                        .map(|j| scene.parts[j].1)
+                        .collect();
+                    // On a larger flat at most as much of its border is near as of the smaller one's.
+                    let flat = met.iter().map(|&other| 2 * flats[own].min(flats[other])).max();
+                    let all = made.shells[own].points.len()
+                        + met.iter().map(|&o| made.shells[o].points.len()).sum::<usize>();
+                    let near = self.fitted(&counts, own, &met).max(flat.unwrap_or(0)).min(all);
+                    TickCost::of(near as u64, all as u64)
+                });
                 PartTick {
                     name: self.model.parts[part].name.clone(),
-                    cost: TickCost::of(near as u64, all as u64),
+                    cost,
                 }
             })
             .collect();
@@ -52,29 +60,33 @@ impl Ticks<'_> {
         ticks
     }
 
-    /// Number of points near when a part of shape `own` sits in all of the parts of shapes `met` that it fits: each bore holds one pin; a pin may be
-    /// in a bore of each other part.
+    /// Number of points near when a part of shape `own` sits in all of the parts of shapes `met` that it fits: each bore holds one pin; a pin is in as many
+    /// bores as its length has place for.
     fn fitted(&self, counts: &[FacePoints], own: usize, met: &[usize]) -> usize {
-        // For each own face, whether it is hollow, and the point count of the largest matching face of each partner.
-        let mut held: BTreeMap<u32, (bool, Vec<usize>)> = BTreeMap::new();
+        // For each own face, whether it is hollow, and the matching face with most points of each partner: points and length.
+        let mut held: BTreeMap<u32, (bool, Vec<(usize, f64)>)> = BTreeMap::new();
         for &other in met {
             let fits = self.fits.iter().find(|(pair, _)| *pair == (own, other));
-            let mut most: BTreeMap<u32, (bool, usize)> = BTreeMap::new();
+            let mut most: BTreeMap<u32, (bool, (usize, f64))> = BTreeMap::new();
             for fit in fits.map_or(&[][..], |(_, fits)| fits) {
-                let points = counts[other].on(fit.faces[1]);
-                let entry = most.entry(fit.faces[0]).or_insert((fit.hollow, 0));
-                entry.1 = entry.1.max(points);
+                let theirs = (counts[other].on(fit.faces[1]), counts[other].length(fit.faces[1]));
+                let entry = most.entry(fit.faces[0]).or_insert((fit.hollow, theirs));
+                if theirs.0 > entry.1.0 {
+                    entry.1 = theirs;
+                }
             }
-            for (face, (hollow, points)) in most {
-                held.entry(face).or_insert((hollow, Vec::new())).1.push(points);
+            for (face, (hollow, theirs)) in most {
+                held.entry(face).or_insert((hollow, Vec::new())).1.push(theirs);
             }
         }
-        let near = |(face, (hollow, theirs)): (u32, (bool, Vec<usize>))| {
-            let own = counts[own].on(face);
+        let near = |(face, (hollow, theirs)): (u32, (bool, Vec<(usize, f64)>))| {
+            let own_points = counts[own].on(face);
             if hollow {
-                own + theirs.iter().max().unwrap_or(&0)
+                own_points + theirs.iter().map(|&(points, _)| points).max().unwrap_or(0)
             } else {
-                theirs.len() * own + theirs.iter().sum::<usize>()
+                let (bores, points) = around(counts[own].length(face), theirs);
+                // Bores are beside one another: a point is in one of them, or where two meet.
+                bores.min(2) * own_points + points
             }
         };
         held.into_iter().map(near).sum()
@@ -88,29 +100,70 @@ impl Ticks<'_> {
     }
 }
 
-/// Number of points on each face of a shape, borders included.
-struct FacePoints(Vec<usize>);
+/// The most bores (points and length each) that can be around a pin of length `pin`, side by side, and their points: those that have most points on their
+/// length, until they fill the pin, and one more over each of its ends.
+fn around(pin: f64, mut bores: Vec<(usize, f64)>) -> (usize, usize) {
+    let density = |&(points, length): &(usize, f64)| points as f64 / length.max(1e-9);
+    bores.sort_by(|a, b| density(b).total_cmp(&density(a)));
+    let (mut filled, mut count) = (0.0, 0);
+    while count < bores.len() && filled < pin {
+        filled += bores[count].1;
+        count += 1;
+    }
+    bores[count..].sort_by_key(|&(points, _)| std::cmp::Reverse(points));
+    count = (count + 2).min(bores.len());
+    (count, bores[..count].iter().map(|(points, _)| points).sum())
+}
+
+/// Number of points on each face of a shape, borders included, and the face's length along its axis.
+struct FacePoints {
+    counts: Vec<usize>,
+    lengths: Vec<f64>,
+}
 
 impl FacePoints {
-    fn of(shell: &Pointshell) -> Self {
-        let mut counts = Vec::new();
-        let mut add = |face: u16| {
+    fn of(shell: &Pointshell, surface: &ExactSurface) -> Self {
+        let faces = &surface.shape().faces;
+        let mut counts = vec![0; faces.len()];
+        let mut spans = vec![[f64::INFINITY, f64::NEG_INFINITY]; faces.len()];
+        let mut add = |face: u16, position: DVec3| {
             let face = usize::from(face);
-            if counts.len() <= face {
-                counts.resize(face + 1, 0);
+            let Some(count) = counts.get_mut(face) else { return };
+            *count += 1;
+            if let Some(along) = along(&faces[face].surface, position) {
+                spans[face] = [spans[face][0].min(along), spans[face][1].max(along)];
             }
-            counts[face] += 1;
         };
         for point in &shell.points {
-            add(point.face);
+            add(point.face, point.position);
             if point.edge_face != point.face && point.edge_face != mortise_protocol::image::NO_FACE {
-                add(point.edge_face);
+                add(point.edge_face, point.position);
             }
         }
-        Self(counts)
+        let length = |(face, [low, high]): (usize, [f64; 2])| match faces[face].surface {
+            Surface::Sphere { radius, .. } => 2.0 * radius,
+            _ => (high - low).max(0.0),
+        };
+        let lengths = spans.into_iter().enumerate().map(length).collect();
+        Self { counts, lengths }
     }
 
     fn on(&self, face: u32) -> usize {
-        self.0.get(face as usize).copied().unwrap_or(0)
+        self.counts.get(face as usize).copied().unwrap_or(0)
+    }
+
+    /// mm; 0 for a face without an axis.
+    fn length(&self, face: u32) -> f64 {
+        self.lengths.get(face as usize).copied().unwrap_or(0.0)
+    }
+}
+
+/// Place of a point along the axis of a round face, mm.
+fn along(surface: &Surface, position: DVec3) -> Option<f64> {
+    match surface {
+        Surface::Cylinder { frame, .. } | Surface::Cone { frame, .. } => {
+            Some((position - frame.origin).dot(frame.z))
+        }
+        _ => None,
     }
 }

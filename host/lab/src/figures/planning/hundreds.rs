@@ -109,7 +109,9 @@ fn chosen(names: &[String], each: usize) -> Vec<usize> {
 fn pulled(step: &Path, scene: &mut PreparedScene, name: &str) -> Result<(f64, u32), LabError> {
     let mut scenario = Scenario::insertion(step)?;
     scenario.scene.part = name.to_owned();
+    // Few samples: their overlap is not what is measured here.
     scenario.depth = None;
+    scenario.run.telemetry_every_ticks = 300;
     let part = scene.part_named(name).unwrap_or_default();
     scene.part = part as u16;
     let body = &scene.bodies()[part];
@@ -122,13 +124,14 @@ fn pulled(step: &Path, scene: &mut PreparedScene, name: &str) -> Result<(f64, u3
     };
     go([0.0; 3]);
     // Up first: what lies on top or stands in a hole leaves it.
-    for axis in [2, 0, 1] {
-        for way in [PULL_MM, -PULL_MM] {
-            let mut offset = [0.0; 3];
-            offset[axis] = way;
-            go(offset);
-            go([0.0; 3]);
-        }
+    for offset in [
+        [0.0, 0.0, PULL_MM],
+        [PULL_MM, 0.0, 0.0],
+        [-PULL_MM, 0.0, 0.0],
+        [0.0, PULL_MM, 0.0],
+    ] {
+        go(offset);
+        go([0.0; 3]);
     }
     scenario.run.duration_s = t;
     let client = connect_with_scene(&scenario, &guided::emulated(), scene)?;
