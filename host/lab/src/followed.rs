@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::{DAffine3, DQuat, DVec3};
-use mortise_bake::{BakeOptions, Grabbable};
+use mortise_bake::{Grabbable, Request};
 use mortise_brep::{CadModel, LoadOptions, load_step_with};
 use mortise_fit::{Fit, FitOptions, find, part_named};
 use mortise_guide::{GuideSettings, along};
@@ -31,8 +31,6 @@ const IN_MM: f64 = 0.1;
 
 /// Straight legs of the hand's motion along the way.
 const LEGS: u32 = 8;
-/// Cells of the scene, mm: exact surfaces answer in them, of free-form faces patches within some micrometres.
-const CELL_MM: f64 = 1.0;
 
 /// How far the hand is off at the mouth.
 #[derive(Clone, Copy, Debug)]
@@ -138,12 +136,12 @@ impl Followed {
         scenario.scene.part = moving.to_owned();
         scenario.depth = None;
         scenario.hand.grip_mm = middle.to_array();
-        let options = BakeOptions {
+        // As the program plans a scene by default.
+        let request = Request {
             grabbable: Grabbable::Named(vec![moving.to_owned()]),
-            cell_mm: Some(CELL_MM),
-            ..BakeOptions::default()
+            ..Request::default()
         };
-        let scene = PreparedScene::bake(step, model, moving, &options)?;
+        let scene = PreparedScene::plan(step, model, moving, &request)?;
         Ok(Self {
             scenario,
             scene,

@@ -50,6 +50,9 @@ const TORQUE_STEP_NM: f32 = 1.8e-3;
 const RELEASE_STEP: f32 = 1.0 / 1024.0;
 /// Smallest share of the stiffness, so that cap over stiffness is defined for a target at zero engagement.
 const MIN_STIFFNESS_SHARE: f32 = 1e-6;
+/// Stiffness of a path's angle as a multiple of k·L²: on a part of 10 mm, k·L² = 100 N m/rad would let the torque of a hand 3° off turn it by up to 0.7
+/// mrad.
+const PATH_TURN_STIFFNESS: f32 = 4.0;
 /// Stiffness of the thesis' constraint spring as a share of the coupling's.
 const THESIS_SHARE: f32 = 0.8;
 
@@ -204,14 +207,15 @@ impl TargetSet {
                     (law(target.force_cap), law(target.torque_cap))
                 }
                 GuidanceMethod::Off | GuidanceMethod::Capped => {
-                    let law = |cap: f32, a: f32| Law::Capped {
-                        stiffness: target.stiffness * (a * a * a * a).max(MIN_STIFFNESS_SHARE),
+                    let law = |cap: f32, a: f32, times: f32| Law::Capped {
+                        stiffness: times * target.stiffness * (a * a * a * a).max(MIN_STIFFNESS_SHARE),
                         cap: cap * a,
                         ahead: at.period_s + at.settings.time_s,
                     };
+                    let turning = target.path.as_ref().map_or(1.0, |_| PATH_TURN_STIFFNESS);
                     (
-                        law(target.force_cap, slot.engagement),
-                        law(target.torque_cap / at.length, slot.torque_engagement()),
+                        law(target.force_cap, slot.engagement, 1.0),
+                        law(target.torque_cap / at.length, slot.torque_engagement(), turning),
                     )
                 }
             };

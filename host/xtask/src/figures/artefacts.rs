@@ -159,6 +159,21 @@ pub const ARTEFACTS: &[Artefact] = &[
         ],
     },
     Artefact {
+        name: "guidance",
+        made: Made::Page { quick: true },
+        sources: &[
+            LAW,
+            LOOP,
+            SCENARIO,
+            &[
+                "host/fit/src",
+                "host/shapes/src",
+                "host/lab/src/figures/guidance",
+                "host/lab/src/followed.rs",
+            ],
+        ],
+    },
+    Artefact {
         name: "workbench",
         made: Made::Page { quick: false },
         sources: &[
