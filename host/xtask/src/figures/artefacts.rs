@@ -160,7 +160,7 @@ pub const ARTEFACTS: &[Artefact] = &[
     },
     Artefact {
         name: "guidance",
-        made: Made::Page { quick: true },
+        made: Made::Page { quick: false },
         sources: &[
             LAW,
             LOOP,
