@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::time::Instant;
 
+use mortise_bake::{Grabbable, Request};
 use mortise_brep::load_step;
 use mortise_scenario::{PreparedScene, Scenario, connect_with_scene, run_on};
 
 use super::super::{Plan, Row};
-use super::{Grabbable, Request};
+
 use crate::guided::{self, key};
 use crate::{LabError, generated};
 
