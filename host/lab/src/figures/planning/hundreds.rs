@@ -8,7 +8,6 @@ use mortise_brep::load_step;
 use mortise_scenario::{PreparedScene, Scenario, connect_with_scene, run_on};
 
 use super::super::{Plan, Row};
-
 use crate::guided::{self, key};
 use crate::{LabError, generated};
 
