@@ -17,7 +17,14 @@ const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// cases each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
 /// Test programs that take longest, longest first: they are begun first, so that none of them runs alone at the end.
-const LONGEST: [&str; 3] = ["host/lab mortise_lab", "firmware/orders depth", "host/app window"];
+const LONGEST: [&str; 6] = [
+    "host/bake signs",
+    "host/lab mortise_lab",
+    "host/bake shared_parts",
+    "firmware/orders depth",
+    "host/app window",
+    "host/bake free_form",
+];
 const BOARD_SIDE: [&str; 5] = [
     "mortise-protocol",
     "mortise-haptics",
