@@ -208,13 +208,14 @@ fn a_slot_filled_by_a_tool_is_a_scene() {
 
 #[test]
 fn more_parts_than_the_board_holds_are_refused() {
-    // 257 parts need more flash than the tests' flash has, so this check uses a flash in RAM.
+    // So many parts need more flash than the tests' flash has, so this check uses a flash in RAM.
     use mortise_firmware::board::ERASED;
+    use mortise_protocol::limits::MAX_PARTS;
     use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
     // A sector for each scene, and one for each of the rig's descriptions.
     let memory = vec![ERASED; 2 * SLOTS * ERASE_SIZE / 32].leak();
     let mut store = Store::open(RamFlash::new(memory));
-    let image = parts(257, 1);
+    let image = parts(MAX_PARTS + 1, 1);
     store
         .begin(image.len() as u32, CRC.checksum(&image), LAYOUT_VERSION)
         .unwrap();
@@ -223,7 +224,9 @@ fn more_parts_than_the_board_holds_are_refused() {
     }
     assert_eq!(
         store.commit().map(drop),
-        Err(Refusal::TooManyParts { capacity: 256 })
+        Err(Refusal::TooManyParts {
+            capacity: MAX_PARTS as u16
+        })
     );
 }
 

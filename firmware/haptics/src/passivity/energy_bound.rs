@@ -37,8 +37,8 @@
 //! by the factor e in each (A·h² + u)/v, 4 ms at 6 mm/s without counts; what comes and goes with the sense of the motion is no more than 0.01 N (k is
 //! 400 N/m here).
 //!
-//! A part that a target has set in motion still carries that energy when the target has ended. So both measures act on until the energy stored exceeds
-//! the credit by less than the budget. From then on the account is only kept, and the tick's output is the same to the bit as without it: the coupling is
+//! A part that a target has set in motion still carries that energy when the target has ended. So both measures act on, until the credit and the budget
+//! cover what is stored or a contact takes the part up. From then on the account is only kept, and the tick's output is the same to the bit as without it: the coupling is
 //! passive by itself and the valve of the tank limits it; B falls no lower than to the reserve. The slip recovers at once where neither target nor contact
 //! acts on the part, which then has nothing to push the hand from. A negative B remains owed: a grab or a fault does not cancel it, only work by the
 //! operator does.
@@ -170,7 +170,8 @@ impl EnergyBound {
     ) {
         let initial = settings.passivity.initial_budget_j;
         let held_firmly = self.slip == Twist::ZERO;
-        self.active = hold == Hold::Targets || !held_firmly || (self.active && self.uncovered);
+        self.active =
+            hold == Hold::Targets || !held_firmly || (self.active && self.uncovered && hold == Hold::Nothing);
         if !self.active {
             return;
         }
@@ -213,7 +214,9 @@ impl EnergyBound {
         } else {
             stored
         };
-        self.uncovered = stored - self.credit_j > (1.0 - RESERVE) * initial;
+        let covered = (1.0 - RESERVE) * initial + self.credit_j;
+        let least = RESERVE * initial;
+        self.uncovered = stored > if covered > least { covered } else { least };
     }
 
     /// `wrench`, scaled down so that its work until the next tick is covered, whatever the operator does. `motion` is the measured twist of the
@@ -429,10 +432,12 @@ mod tests {
         };
         assert!(passes(Hold::Nothing, 1e-3), "no target yet");
         assert!(!passes(Hold::Targets, 1e-3));
-        for hold in [Hold::Nothing, Hold::Contacts, Hold::Nothing] {
-            assert!(!passes(hold, 1e-3), "{hold:?}");
+        for _ in 0..3 {
+            assert!(!passes(Hold::Nothing, 1e-3));
         }
         assert!(!passes(Hold::Nothing, 0.0), "spent within this tick");
         assert!(passes(Hold::Nothing, 1e-3));
+        assert!(!passes(Hold::Targets, 1e-3));
+        assert!(passes(Hold::Contacts, 1e-3), "a contact acts on the part");
     }
 }
