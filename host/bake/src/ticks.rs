@@ -84,9 +84,8 @@ impl Ticks<'_> {
             if hollow {
                 own_points + theirs.iter().map(|&(points, _)| points).max().unwrap_or(0)
             } else {
-                let (bores, points) = around(counts[own].length(face), theirs);
                 // Bores are beside one another: a point is in one of them, or where two meet.
-                bores.min(2) * own_points + points
+                theirs.len().min(2) * own_points + around(counts[own].length(face), theirs)
             }
         };
         held.into_iter().map(near).sum()
@@ -100,19 +99,21 @@ impl Ticks<'_> {
     }
 }
 
-/// The most bores (points and length each) that can be around a pin of length `pin`, side by side, and their points: those that have most points on their
-/// length, until they fill the pin, and one more over each of its ends.
-fn around(pin: f64, mut bores: Vec<(usize, f64)>) -> (usize, usize) {
+/// Upper bound of the points of bores (points and length each) that are side by side around a pin of length `pin`: of those with most points on their length
+/// until they fill the pin, and once more of the two with most points, which may extend over its ends.
+fn around(pin: f64, mut bores: Vec<(usize, f64)>) -> usize {
+    let all: usize = bores.iter().map(|(points, _)| points).sum();
+    bores.sort_by_key(|&(points, _)| std::cmp::Reverse(points));
+    let at_ends: usize = bores.iter().take(2).map(|(points, _)| points).sum();
     let density = |&(points, length): &(usize, f64)| points as f64 / length.max(1e-9);
     bores.sort_by(|a, b| density(b).total_cmp(&density(a)));
-    let (mut filled, mut count) = (0.0, 0);
-    while count < bores.len() && filled < pin {
-        filled += bores[count].1;
-        count += 1;
-    }
-    bores[count..].sort_by_key(|&(points, _)| std::cmp::Reverse(points));
-    count = (count + 2).min(bores.len());
-    (count, bores[..count].iter().map(|(points, _)| points).sum())
+    let mut filled = 0.0;
+    let on_pin = bores.iter().take_while(|(_, length)| {
+        let is_full = filled >= pin;
+        filled += length;
+        !is_full
+    });
+    all.min(at_ends + on_pin.map(|(points, _)| points).sum::<usize>())
 }
 
 /// Number of points on each face of a shape, borders included, and the face's length along its axis.
@@ -165,5 +166,42 @@ fn along(surface: &Surface, position: DVec3) -> Option<f64> {
             Some((position - frame.origin).dot(frame.z))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::around;
+
+    proptest! {
+        /// Against all choices of bores that lie on the pin, and of two over its ends.
+        #[test]
+        fn no_bores_around_a_pin_have_more_points(
+            pin in 1.0f64..20.0,
+            bores in prop::collection::vec((0usize..100, 0.5f64..30.0), 0..9),
+        ) {
+            let mut most = 0;
+            for chosen in 0u32..1 << bores.len() {
+                let of = |i: &usize| chosen >> i & 1 == 1;
+                let mut lengths: Vec<f64> = (0..bores.len()).filter(of).map(|i| bores[i].1).collect();
+                lengths.sort_by(f64::total_cmp);
+                // The two longest extend over the ends.
+                lengths.truncate(lengths.len().saturating_sub(2));
+                if lengths.iter().sum::<f64>() <= pin {
+                    most = most.max((0..bores.len()).filter(of).map(|i| bores[i].0).sum());
+                }
+            }
+            let all: usize = bores.iter().map(|bore| bore.0).sum();
+            let bound = around(pin, bores.clone());
+            prop_assert!(bound >= most && bound <= all, "{bound} {most}");
+        }
+    }
+
+    /// Nuts of 5 mm on a bolt of 23 mm: four whole ones and one more that begins on it, and one over each end.
+    #[test]
+    fn as_many_nuts_are_on_a_bolt_as_it_has_place_for() {
+        assert_eq!(around(23.0, vec![(30, 5.0); 82]), 7 * 30);
     }
 }

@@ -28,7 +28,6 @@ const SPEED_MM_S: f64 = 25.0;
 const SETTLING_TICKS: u32 = 150;
 /// A part that comes so near to the end of its way is in, mm.
 const IN_MM: f64 = 0.1;
-
 /// Straight legs of the hand's motion along the way.
 const LEGS: u32 = 8;
 

@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use tempfile::NamedTempFile;
 
 use crate::error::LabError;
@@ -126,25 +126,37 @@ impl StepText {
 
     /// A polyhedron: vertices, and the loop of each planar face, counter-clockwise seen from outside.
     pub fn polyhedron(&mut self, corners: &[DVec3], loops: &[Vec<usize>]) -> u64 {
+        self.polyhedron_with(corners, loops, &vec![Vec::new(); loops.len()], Vec::new())
+    }
+
+    /// The same with holes in each planar face, closed edges clockwise seen from outside, and with further `faces`.
+    pub fn polyhedron_with(
+        &mut self,
+        corners: &[DVec3],
+        loops: &[Vec<usize>],
+        holes: &[Vec<(u64, bool)>],
+        mut faces: Vec<u64>,
+    ) -> u64 {
         let vertices: Vec<u64> = corners.iter().map(|&p| self.vertex(p)).collect();
         let mut edges = HashMap::new();
-        let faces: Vec<u64> = (loops.iter())
-            .map(|corner| {
-                let next = corner.iter().cycle().skip(1);
-                let sides: Vec<(u64, bool)> = (corner.iter().zip(next))
-                    .map(|(&a, &b)| {
-                        let [p, q] = [a.min(b), a.max(b)];
-                        let edge = *edges.entry([p, q]).or_insert_with(|| {
-                            self.straight([vertices[p], vertices[q]], [corners[p], corners[q]])
-                        });
-                        (edge, a < b)
-                    })
-                    .collect();
-                let [p, q, r] = [0, 1, 2].map(|k| corners[corner[k]]);
-                let plane = self.plane(p, (q - p).cross(r - q).normalize());
-                self.face(&sides, plane)
-            })
-            .collect();
+        for (corner, holes) in loops.iter().zip(holes) {
+            let next = corner.iter().cycle().skip(1);
+            let sides: Vec<(u64, bool)> = (corner.iter().zip(next))
+                .map(|(&a, &b)| {
+                    let [p, q] = [a.min(b), a.max(b)];
+                    let edge = *edges.entry([p, q]).or_insert_with(|| {
+                        self.straight([vertices[p], vertices[q]], [corners[p], corners[q]])
+                    });
+                    (edge, a < b)
+                })
+                .collect();
+            let [p, q, r] = [0, 1, 2].map(|k| corners[corner[k]]);
+            let plane = self.plane(p, (q - p).cross(r - q).normalize());
+            let bounds: Vec<&[(u64, bool)]> = (std::iter::once(sides.as_slice()))
+                .chain(holes.iter().map(std::slice::from_ref))
+                .collect();
+            faces.push(self.face_of(&bounds, plane, true));
+        }
         self.solid(&faces)
     }
 
@@ -250,6 +262,22 @@ impl StepText {
             self.data
         ))
     }
+}
+
+/// Vertices and loops of a prism along z, for [`StepText::polyhedron`]: its outline, counter-clockwise seen from above, and its two heights. Loop 0 is the lower end,
+/// loop 1 the upper one, loop 2 + i the side from corner i to the next.
+pub(crate) fn prism(outline: &[DVec2], heights: [f64; 2]) -> (Vec<DVec3>, Vec<Vec<usize>>) {
+    let count = outline.len();
+    let corners = (heights.iter())
+        .flat_map(|&z| outline.iter().map(move |p| p.extend(z)))
+        .collect();
+    let low = (0..count).rev().collect();
+    let high = (count..2 * count).collect();
+    let sides = (0..count).map(|i| {
+        let next = (i + 1) % count;
+        vec![i, next, count + next, count + i]
+    });
+    (corners, [low, high].into_iter().chain(sides).collect())
 }
 
 /// A number that always has a point or an exponent.

@@ -38,10 +38,10 @@
 //! 400 N/m here).
 //!
 //! A part that a target has set in motion still carries that energy when the target has ended. So both measures act on, until the credit and the budget
-//! cover what is stored or a contact takes the part up. From then on the account is only kept, and the tick's output is the same to the bit as without it: the coupling is
-//! passive by itself and the valve of the tank limits it; B falls no lower than to the reserve. The slip recovers at once where neither target nor contact
-//! acts on the part, which then has nothing to push the hand from. A negative B remains owed: a grab or a fault does not cancel it, only work by the
-//! operator does.
+//! cover what is stored or a contact takes the part up. From then on the account is only kept, and the tick's output is the same to the bit as without it:
+//! the coupling is passive by itself and the valve of the tank limits it; B falls no lower than to the reserve. The slip recovers at once where neither
+//! target nor contact acts on the part, which then has nothing to push the hand from. A negative B remains owed: a grab or a fault does not cancel it, only
+//! work by the operator does.
 //!
 //! The account is that of Ferraguti, Secchi and Fantuzzi, ICRA 2013 (see [`super::tank`]); slip in place of a softer spring is ours. Cost: 20
 //! instructions without targets, about 350 with.

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use mortise_brep::Shape;
 
 use crate::LabError;
-use crate::step_text::StepText;
+use crate::step_text::{StepText, prism};
 
 /// Half width of the block, its height, and the depth of the hole, mm; and the length of the peg.
 const HALF: f64 = 25.0;
@@ -67,7 +67,11 @@ impl Section {
     pub fn shapes(self) -> Result<[Shape; 2], LabError> {
         let mut text = StepText::new();
         let corners = self.corners();
-        let (block, peg) = (block(&mut text, &corners), prism(&mut text, &corners));
+        let (corners_of_peg, loops) = prism(&corners, [0.0, LENGTH]);
+        let (block, peg) = (
+            block(&mut text, &corners),
+            text.polyhedron(&corners_of_peg, &loops),
+        );
         text.part("block", block, DAffine3::IDENTITY);
         text.part("peg", peg, DAffine3::IDENTITY);
         let model = mortise_brep::load_step(text.file()?.path())?;
@@ -81,18 +85,6 @@ impl Section {
         };
         Ok([shape("block")?, shape("peg")?])
     }
-}
-
-fn prism(text: &mut StepText, corners: &[DVec2]) -> u64 {
-    let count = corners.len();
-    let at = |z: f64| corners.iter().map(move |p| p.extend(z));
-    let all: Vec<DVec3> = at(0.0).chain(at(LENGTH)).collect();
-    let mut loops = vec![(0..count).rev().collect(), (count..2 * count).collect()];
-    loops.extend((0..count).map(|i| {
-        let next = (i + 1) % count;
-        vec![i, next, count + next, count + i]
-    }));
-    text.polyhedron(&all, &loops)
 }
 
 /// The top is divided from each corner of the hole to the place on the block's border in the same direction.

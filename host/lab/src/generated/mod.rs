@@ -49,6 +49,11 @@ const PER_BRACKET: usize = 12;
 /// with the bracket; of each of the two on the cover those with washer, cover, bracket and nut, the washer with the cover, and the nut with the bracket.
 const PAIRS: usize = 2 + 2 * 4 + 2 * 6;
 
+/// Number of parts in the full and in the shorter form of tables.
+const PARTS: usize = 500;
+const PARTS_QUICK: usize = 40;
+const SEED: u64 = 19;
+
 /// Kinds of parts, in the order of their shapes in the file.
 #[derive(Clone, Copy)]
 enum Kind {
@@ -83,14 +88,19 @@ struct Layout {
     pins: Vec<DVec2>,
 }
 
+/// Number of parts of which tables measure an assembly.
+pub(crate) fn parts(quick: bool) -> usize {
+    if quick { PARTS_QUICK } else { PARTS }
+}
+
 /// A STEP file of a generated assembly of `count` parts, removed when dropped.
 ///
 /// Cost: the kernel reads one of each shape and writes the text, some seconds for hundreds of parts.
 ///
 /// # Errors
 /// A file that cannot be written or read.
-pub(crate) fn file(count: usize, seed: u64) -> Result<NamedTempFile, LabError> {
-    let layout = Layout::new(count, seed);
+pub(crate) fn file(count: usize) -> Result<NamedTempFile, LabError> {
+    let layout = Layout::new(count, SEED);
     let mut text = StepText::new();
     for (kind, name) in Kind::ALL {
         let solid = layout.solid(kind, &mut text);

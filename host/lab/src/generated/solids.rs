@@ -1,10 +1,8 @@
 //! Solids of machined parts for STEP texts: polyhedra with round bores, and turned parts.
 
-use std::collections::HashMap;
-
 use glam::{DVec2, DVec3};
 
-use crate::step_text::{StepText, number};
+use crate::step_text::{StepText, number, prism};
 
 /// A round bore at right angles to a face.
 #[derive(Clone, Copy, Debug)]
@@ -75,33 +73,12 @@ impl StepText {
             ];
             faces.push(self.face_of(&[&wall], pipe.surface, false));
         }
-        let vertices: Vec<u64> = corners.iter().map(|&p| self.vertex(p)).collect();
-        let mut edges = HashMap::new();
-        for (corner, holes) in loops.iter().zip(&holes) {
-            let next = corner.iter().cycle().skip(1);
-            let sides: Vec<(u64, bool)> = (corner.iter().zip(next))
-                .map(|(&a, &b)| {
-                    let [p, q] = [a.min(b), a.max(b)];
-                    let edge = *edges.entry([p, q]).or_insert_with(|| {
-                        self.straight([vertices[p], vertices[q]], [corners[p], corners[q]])
-                    });
-                    (edge, a < b)
-                })
-                .collect();
-            let [p, q, r] = [0, 1, 2].map(|k| corners[corner[k]]);
-            let plane = self.plane(p, (q - p).cross(r - q).normalize());
-            let bounds: Vec<&[(u64, bool)]> = (std::iter::once(sides.as_slice()))
-                .chain(holes.iter().map(std::slice::from_ref))
-                .collect();
-            faces.push(self.face_of(&bounds, plane, true));
-        }
-        self.solid(&faces)
+        self.polyhedron_with(corners, loops, &holes, faces)
     }
 
-    /// A prism along z: its outline, counter-clockwise seen from above and convex at its first corner, and its two heights. Face 0 is the lower end, face 1
-    /// the upper one, face 2 + i the side from corner i to the next.
-    pub fn prism(&mut self, outline: &[DVec2], [low, high]: [f64; 2], bores: &[Bore]) -> u64 {
-        let (corners, loops) = prism(outline, [low, high]);
+    /// A prism with bores: faces are the loops of [`prism`]; the outline is convex at its first corner.
+    pub fn prism(&mut self, outline: &[DVec2], heights: [f64; 2], bores: &[Bore]) -> u64 {
+        let (corners, loops) = prism(outline, heights);
         self.drilled(&corners, &loops, bores)
     }
 
@@ -144,19 +121,4 @@ impl StepText {
         }
         self.solid(&faces)
     }
-}
-
-/// Vertices and loops of a prism along z.
-pub(crate) fn prism(outline: &[DVec2], heights: [f64; 2]) -> (Vec<DVec3>, Vec<Vec<usize>>) {
-    let count = outline.len();
-    let corners = (heights.iter())
-        .flat_map(|&z| outline.iter().map(move |p| p.extend(z)))
-        .collect();
-    let low = (0..count).rev().collect();
-    let high = (count..2 * count).collect();
-    let sides = (0..count).map(|i| {
-        let next = (i + 1) % count;
-        vec![i, next, count + next, count + i]
-    });
-    (corners, [low, high].into_iter().chain(sides).collect())
 }

@@ -261,6 +261,7 @@ const VERBS: &[&str] = &[
     "Solve",
     "Sort",
     "Speed",
+    "Spend",
     "Split",
     "Stabilise",
     "Start",

@@ -9,10 +9,6 @@ use super::assembly_file::refused;
 use crate::figures::{Plan, Row};
 use crate::{LabError, generated};
 
-/// Number of parts in the full and in the shorter form.
-const PARTS: usize = 500;
-const PARTS_QUICK: usize = 40;
-const SEED: u64 = 19;
 /// Longest times, s, and most memory, MiB.
 const OPEN_S: f64 = 10.0;
 const GRAPH_S: f64 = 10.0;
@@ -21,9 +17,9 @@ const MEMORY_MIB: f64 = 4096.0;
 
 /// Measures the rows.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let count = if plan.quick { PARTS_QUICK } else { PARTS };
+    let count = generated::parts(plan.quick);
     let what = format!("generated assembly of {count} parts");
-    let file = generated::file(count, SEED)?;
+    let file = generated::file(count)?;
     let begun = reset_peak();
 
     let start = Instant::now();

@@ -11,10 +11,8 @@ use super::super::{Plan, Row};
 use crate::guided::{self, key};
 use crate::{LabError, generated};
 
-/// Number of parts in the full and in the shorter form.
-const PARTS: usize = 500;
-const PARTS_QUICK: usize = 40;
-const SEED: u64 = 19;
+/// Seed by which parts are drawn.
+const DRAW: u64 = 19;
 /// Parts of each kind that are held.
 const EACH: usize = 2;
 const EACH_QUICK: usize = 1;
@@ -23,19 +21,16 @@ const OPEN_S: f64 = 10.0;
 const BAKE_S: f64 = 60.0;
 /// Instructions of a tick.
 const TICK: f64 = 120_000.0;
-/// The hand pulls by this along each axis, to and fro, mm, at this speed, mm/s.
+/// The hand pulls by this, mm, out and back along each axis, at this speed, mm/s.
 const PULL_MM: f64 = 6.0;
 const MM_PER_S: f64 = 20.0;
 
 /// Measures the rows.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let (count, each) = if plan.quick {
-        (PARTS_QUICK, EACH_QUICK)
-    } else {
-        (PARTS, EACH)
-    };
+    let count = generated::parts(plan.quick);
+    let each = if plan.quick { EACH_QUICK } else { EACH };
     let what = |what: &str| format!("generated assembly of {count} parts, planned by default: {what}");
-    let file = generated::file(count, SEED)?;
+    let file = generated::file(count)?;
     let begun = Instant::now();
     let model = load_step(file.path())?;
     let opened = begun.elapsed().as_secs_f64();
@@ -61,8 +56,8 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     ));
     let held = chosen(&names, each);
     let mut seen = Vec::new();
-    for &part in &held {
-        seen.push(pulled(file.path(), &mut scene, &names[part])?);
+    for name in &held {
+        seen.push(pulled(file.path(), &mut scene, name)?);
     }
     let what = |of: &str| {
         what(&format!(
@@ -88,17 +83,15 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
 }
 
 /// Some parts of every kind: names are the kind and a number.
-fn chosen(names: &[String], each: usize) -> Vec<usize> {
-    let mut random = fastrand::Rng::with_seed(SEED);
+fn chosen(names: &[String], each: usize) -> Vec<String> {
+    let mut random = fastrand::Rng::with_seed(DRAW);
     let kind = |name: &str| name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
     let mut kinds: Vec<String> = names.iter().map(|name| kind(name)).collect();
     kinds.sort();
     kinds.dedup();
     let mut all = Vec::new();
     for of in kinds {
-        let mut parts: Vec<usize> = (0..names.len())
-            .filter(|&part| kind(&names[part]) == of)
-            .collect();
+        let mut parts: Vec<String> = names.iter().filter(|name| kind(name) == of).cloned().collect();
         random.shuffle(&mut parts);
         all.extend(parts.into_iter().take(each));
     }
@@ -109,10 +102,13 @@ fn chosen(names: &[String], each: usize) -> Vec<usize> {
 fn pulled(step: &Path, scene: &mut PreparedScene, name: &str) -> Result<(f64, u32), LabError> {
     let mut scenario = Scenario::insertion(step)?;
     scenario.scene.part = name.to_owned();
-    // Few samples: their overlap is not what is measured here.
     scenario.depth = None;
+    // Few samples: their overlap is not what is measured here.
     scenario.run.telemetry_every_ticks = 300;
-    let part = scene.part_named(name).unwrap_or_default();
+    let part = scene.part_named(name).ok_or_else(|| LabError::Input {
+        name: name.to_owned(),
+        what: "is not in the image".to_owned(),
+    })?;
     scene.part = part as u16;
     let body = &scene.bodies()[part];
     scenario.hand.grip_mm = body.placement.transform_point3(body.center).to_array();
