@@ -77,6 +77,10 @@ pub fn run(options: Options) -> anyhow::Result<()> {
             let session = Session::new(Arc::new(move || ctx.request_repaint()));
             let mut window = Window::new(session.with_cache(FolderCache::of_user()).with_state(folder));
             window.view.see_through = options.see_through;
+            #[cfg(unix)]
+            {
+                window.space_mouse = Some(super::space_mouse::SpaceMouse::follow(&creation.egui_ctx));
+            }
             for intent in options.first {
                 window.session.act(intent);
             }

@@ -94,6 +94,17 @@ pub const KEYS: &[Group] = &[
         ],
     ),
     (
+        "SpaceMouse",
+        &[
+            (
+                "Cap",
+                "move the view, or the part: the selected one, or the one that a simulated hand holds",
+            ),
+            ("Left button", "switch between view and part"),
+            ("Right button", "see everything"),
+        ],
+    ),
+    (
         "Simulated hand",
         &[
             ("Drag the held part", "move the hand"),

@@ -30,12 +30,16 @@ pub mod plots;
 mod recent;
 mod rig;
 mod section;
+#[cfg(unix)]
+pub mod space_mouse;
 mod stop;
 pub mod theme;
 mod undo;
 mod view;
 
 use std::time::Duration;
+#[cfg(unix)]
+use std::time::Instant;
 
 use egui::{Key, Modifiers, Ui};
 
@@ -73,6 +77,9 @@ pub struct Window {
     command: command::CommandLine,
     motion: motion::Fields,
     help: keys::Help,
+    /// A six-axis device, if one is followed.
+    #[cfg(unix)]
+    pub space_mouse: Option<space_mouse::SpaceMouse>,
 }
 
 impl Window {
@@ -93,6 +100,8 @@ impl Window {
             command: command::CommandLine::default(),
             motion: motion::Fields::default(),
             help: keys::Help::default(),
+            #[cfg(unix)]
+            space_mouse: None,
         }
     }
 
@@ -104,6 +113,8 @@ impl Window {
         stop::keys(ui.ctx(), &self.session, &mut wanted);
         let stops = wanted.contains(&Intent::Stop);
         self.view.handles.keys(ui, &mut self.session, stops);
+        #[cfg(unix)]
+        self.steer(ui);
         self.command.keys(ui);
         self.help.keys(ui);
         shortcuts(ui, &self.session, &mut wanted);
@@ -130,6 +141,28 @@ impl Window {
         if !matches!(self.session.link, Link::None) {
             // A request without delay would draw two frames.
             ui.ctx().request_repaint_after(CALM);
+        }
+    }
+
+    /// Moves what the cap of a SpaceMouse moves, and takes its buttons.
+    #[cfg(unix)]
+    fn steer(&mut self, ui: &Ui) {
+        let Some(mouse) = &mut self.space_mouse else {
+            return;
+        };
+        self.view.six_axis.is_there = mouse.is_there();
+        let wanted = mouse.frame(Instant::now(), ui.input(|input| input.focused));
+        for button in wanted.pressed {
+            match button {
+                0 => self.view.six_axis.switch(),
+                1 => self.view.six_axis.wants_all = true,
+                _ => {}
+            }
+        }
+        self.view
+            .steer(&wanted.deflection, wanted.seconds, &mut self.session);
+        if !wanted.deflection.is_rest() {
+            ui.ctx().request_repaint();
         }
     }
 

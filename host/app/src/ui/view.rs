@@ -15,6 +15,7 @@ use crate::viewport::camera::{Projection, View};
 use crate::viewport::compose::{Look, compose, touching_points};
 use crate::viewport::gesture::{Viewpoint, on_screen};
 use crate::viewport::picture::Ground;
+use crate::viewport::six_axis::{Subject, Use};
 use crate::viewport::surface::Surface;
 
 /// Draws the view.
@@ -81,7 +82,9 @@ pub fn show(
 
 /// Says in the lower right corner what pointer and keys do now.
 fn hint(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
-    let hint = if view.drags_hand() {
+    let hint = if let Some(hint) = steering(view) {
+        hint
+    } else if view.drags_hand() {
         "Moving the hand · Ctrl turns it"
     } else if view.handles.over().is_some() {
         "Drag: move the part · Ctrl: steps, with Shift finer · Esc: take back"
@@ -101,6 +104,15 @@ fn hint(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
         FontId::proportional(11.5),
         theme::of(ui).text_weak.gamma_multiply(0.8),
     );
+}
+
+/// What the SpaceMouse moves now.
+fn steering(view: &Viewpoint) -> Option<&'static str> {
+    match view.six_axis.subject()? {
+        Subject::Hand(_) => Some("SpaceMouse: moving the hand"),
+        Subject::Part(..) => Some("SpaceMouse: moving the part"),
+        Subject::View | Subject::Nothing => None,
+    }
 }
 
 fn empty(ui: &mut Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
@@ -251,6 +263,7 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) -> 
             }
             section::toggle(ui, document, view);
             measure::toggle(ui, view);
+            space_mouse(ui, view);
         });
     });
     drawn.response.rect.bottom()
@@ -265,6 +278,23 @@ fn projection(ui: &mut Ui, view: &mut Viewpoint) {
         .on_hover_text("Orthographic view: equal lengths look equal at every depth (5)");
     if response.clicked() {
         view.switch_projection();
+    }
+}
+
+/// Draws the button that chooses what a SpaceMouse moves, where there is one.
+fn space_mouse(ui: &mut Ui, view: &mut Viewpoint) {
+    if !view.six_axis.is_there {
+        return;
+    }
+    let moves_parts = view.six_axis.used == Use::Part;
+    let response = ui
+        .add(control::flat(ui, "SpaceMouse: part", moves_parts))
+        .accessible_name("SpaceMouse moves the part")
+        .on_hover_text(
+            "The SpaceMouse moves the selected part, or the simulated hand that holds one, in place of the view (its left button)",
+        );
+    if response.clicked() {
+        view.six_axis.switch();
     }
 }
 

@@ -9,6 +9,7 @@ use super::measure::Measure;
 use super::pick::{Pick, pick};
 pub use super::screen::on_screen;
 use super::screen::{aspect, ndc};
+use super::six_axis::SixAxis;
 use crate::cut::SectionView;
 use crate::display::extent::Extent;
 use crate::session::document::Document;
@@ -64,6 +65,8 @@ pub struct Viewpoint {
     pub measure: Measure,
     /// Handles of the selected part; none while measuring.
     pub handles: Handles,
+    /// Motion by a six-axis device.
+    pub six_axis: SixAxis,
     pub(super) goal: Option<Camera>,
     drag: Option<Drag>,
     /// Document at which the camera looks.
@@ -101,7 +104,8 @@ impl Viewpoint {
     /// Handles all pointer and key input over the view.
     pub fn respond(&mut self, ui: &Ui, response: &Response, session: &mut Session, wanted: &mut Vec<Intent>) {
         let rect = response.rect;
-        let handles_are_shown = !self.measure.on || self.handles.hold().is_some();
+        let is_held = self.handles.hold().is_some();
+        let handles_are_shown = is_held || !self.measure.on && self.six_axis.subject().is_none();
         let on_handle = handles_are_shown && self.handles.respond(ui, response, session, &self.camera);
         let Some(document) = &session.document else { return };
         let extent = document.extent;
@@ -113,7 +117,8 @@ impl Viewpoint {
             (self.picked, self.marked) = (None, Marked::default());
         }
         let typing = ui.ctx().text_edit_focused();
-        if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
+        let wants_all = std::mem::take(&mut self.six_axis.wants_all);
+        if wants_all || !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
             self.fit(extent, rect);
         }
         if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::X)) {
@@ -284,6 +289,11 @@ impl Viewpoint {
             self.goal = None;
         }
         ui.ctx().request_repaint();
+    }
+
+    /// Whether the pointer drags anything.
+    pub(super) fn is_dragging(&self) -> bool {
+        self.drag.is_some() || self.handles.hold().is_some()
     }
 
     /// Whether the held part is being dragged.

@@ -22,5 +22,7 @@ mod project;
 mod recording;
 mod said_once;
 mod section_view;
+#[cfg(unix)]
+mod space_mouse;
 mod views;
 mod visibility;
