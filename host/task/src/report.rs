@@ -70,6 +70,45 @@ pub struct StepReport<'a> {
     pub nearest: Option<[&'a str; 2]>,
 }
 
+impl StepReport<'_> {
+    /// The step in words: what moves, along which direction, and how near it passes.
+    pub fn words(&self) -> String {
+        let way = match self.direction {
+            Some(d) => format!("along {}", direction(d)),
+            None => "by a turn".into(),
+        };
+        let gap = match (self.overlap_um, self.clearance_um) {
+            (Some(overlap), _) if overlap > 0.05 => format!("overlap {overlap:.1} µm"),
+            (Some(_), Some(clearance)) => format!("clearance {clearance:.1} µm"),
+            (Some(_), None) => "clear".into(),
+            (None, _) => "not measured in the time".into(),
+        };
+        let legs = if self.legs > 1 {
+            format!(", {} legs", self.legs)
+        } else {
+            String::new()
+        };
+        format!("{} {way}{legs}: {gap}", self.moving.join(", "))
+    }
+}
+
+/// A direction in words: an axis, or its components.
+pub fn direction([x, y, z]: [f64; 3]) -> String {
+    let names = [
+        ([1.0, 0.0, 0.0], "+x"),
+        ([-1.0, 0.0, 0.0], "-x"),
+        ([0.0, 1.0, 0.0], "+y"),
+        ([0.0, -1.0, 0.0], "-y"),
+        ([0.0, 0.0, 1.0], "+z"),
+        ([0.0, 0.0, -1.0], "-z"),
+    ];
+    let near = |d: &[f64; 3]| (d[0] - x).abs().max((d[1] - y).abs()).max((d[2] - z).abs()) < 1e-6;
+    names
+        .iter()
+        .find(|(d, _)| near(d))
+        .map_or_else(|| format!("({x:.4}, {y:.4}, {z:.4})"), |(_, name)| (*name).into())
+}
+
 /// What stays together.
 #[derive(Clone, Debug, Serialize)]
 pub struct StuckReport<'a> {
@@ -81,6 +120,15 @@ pub struct StuckReport<'a> {
     pub overlap_um: Option<f64>,
     /// Proof that they cannot come apart; `None`: no way was found.
     pub proof: Option<String>,
+}
+
+impl StuckReport<'_> {
+    /// What stays together, in words, and what holds it.
+    pub fn words(&self) -> String {
+        let [a, b] = self.pair;
+        let lacks = (self.overlap_um).map_or(String::new(), |um| format!(" by {um:.1} µm at the least"));
+        format!("{} stay together: {a} meets {b}{lacks}", self.parts.join(", "))
+    }
 }
 
 /// Result of `assemble` and `disassemble`.

@@ -105,7 +105,7 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
                 (Some(range), Some(meets)) => format!("{range:.3} mm to {meets}"),
                 _ => "out".into(),
             };
-            lines::text(&format!("  along {}: {reach}", direction(t.direction)))?;
+            lines::text(&format!("  along {}: {reach}", report::direction(t.direction)))?;
         }
         for r in &part.rotations {
             let [x, y, z] = r.point_mm;
@@ -117,7 +117,7 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
             };
             lines::text(&format!(
                 "  about {} through {x:.3}, {y:.3}, {z:.3} mm: {range}",
-                direction(r.direction)
+                report::direction(r.direction)
             ))?;
         }
         if part.translations.is_empty() && part.rotations.is_empty() {
@@ -125,22 +125,6 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn direction([x, y, z]: [f64; 3]) -> String {
-    let names = [
-        ([1.0, 0.0, 0.0], "+x"),
-        ([-1.0, 0.0, 0.0], "-x"),
-        ([0.0, 1.0, 0.0], "+y"),
-        ([0.0, -1.0, 0.0], "-y"),
-        ([0.0, 0.0, 1.0], "+z"),
-        ([0.0, 0.0, -1.0], "-z"),
-    ];
-    let near = |d: &[f64; 3]| (d[0] - x).abs().max((d[1] - y).abs()).max((d[2] - z).abs()) < 1e-6;
-    names
-        .iter()
-        .find(|(d, _)| near(d))
-        .map_or_else(|| format!("({x:.4}, {y:.4}, {z:.4})"), |(_, name)| (*name).into())
 }
 
 /// Runs `assemble`.
@@ -215,36 +199,10 @@ fn print_sequence(report: &SequenceReport<'_>, json: bool) -> anyhow::Result<Exi
         return Ok(code);
     }
     for step in &report.steps {
-        let way = match step.direction {
-            Some(d) => format!("along {}", direction(d)),
-            None => "by a turn".into(),
-        };
-        let gap = match (step.overlap_um, step.clearance_um) {
-            (Some(overlap), _) if overlap > 0.05 => format!("overlap {overlap:.1} µm"),
-            (Some(_), Some(clearance)) => format!("clearance {clearance:.1} µm"),
-            (Some(_), None) => "clear".into(),
-            (None, _) => "not measured in the time".into(),
-        };
-        let legs = if step.legs > 1 {
-            format!(", {} legs", step.legs)
-        } else {
-            String::new()
-        };
-        lines::text(&format!(
-            "{}. {} {way}{legs}: {gap}",
-            step.step,
-            step.moving.join(", ")
-        ))?;
+        lines::text(&format!("{}. {}", step.step, step.words()))?;
     }
     for stuck in &report.stuck {
-        let [a, b] = stuck.pair;
-        let lacks = stuck
-            .overlap_um
-            .map_or(String::new(), |um| format!(" by {um:.1} µm at the least"));
-        lines::text(&format!(
-            "{} stay together: {a} meets {b}{lacks}",
-            stuck.parts.join(", ")
-        ))?;
+        lines::text(&stuck.words())?;
     }
     lines::text(&format!(
         "{} in {:.1} s",

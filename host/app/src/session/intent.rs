@@ -106,6 +106,17 @@ pub enum Intent {
     FollowFit,
     /// Show no fits any more.
     DropFits,
+    /// Find the steps in which the assembly goes together.
+    FindSequence,
+    /// Cancel the search for them.
+    CancelSequence,
+    /// Put the parts where they are after so many of these steps.
+    GoToStep {
+        /// Number of steps done, with a share of the next one.
+        done: f64,
+        /// Whether it goes on with the motion before, as while a slider is dragged.
+        goes_on: bool,
+    },
     /// Ask where to write the project.
     SaveProject,
     /// Write the project.
@@ -309,6 +320,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         | Intent::TurnOver
         | Intent::FollowFit
         | Intent::PlaceFit => fits(session, intent),
+        Intent::FindSequence | Intent::CancelSequence | Intent::GoToStep { .. } => sequence(session, intent),
         Intent::SaveProject | Intent::WriteProject { .. } => {
             session.document.is_none().then(|| NO_FILE.to_owned())
         }
@@ -351,6 +363,21 @@ fn fits(session: &Session, intent: &Intent) -> Option<String> {
         },
         _ => shown.is_none().then(|| NO_FIT.to_owned()),
     }
+}
+
+fn sequence(session: &Session, intent: &Intent) -> Option<String> {
+    let sequencing = &session.sequencing;
+    let reason = match (&session.document, intent) {
+        (None, _) => NO_FILE,
+        (Some(_), Intent::CancelSequence) if sequencing.since().is_none() => "No search is under way",
+        (Some(_), Intent::CancelSequence) => return None,
+        (Some(_), Intent::FindSequence) if sequencing.since().is_some() => "The search is under way",
+        (Some(document), Intent::FindSequence) if document.model.parts.len() < 2 => "One part is no assembly",
+        (Some(_), Intent::FindSequence) => return None,
+        (Some(document), _) if sequencing.found(document).is_none() => "Find the steps first",
+        _ => session.no_move()?,
+    };
+    Some(reason.to_owned())
 }
 
 fn connect(session: &Session) -> Option<String> {

@@ -38,6 +38,8 @@ mod record;
 pub mod recording;
 pub mod remaining;
 mod saved;
+pub mod sequence;
+pub mod sequencing;
 mod state;
 pub mod steps;
 pub mod tap;

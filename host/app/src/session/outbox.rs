@@ -15,6 +15,7 @@ use super::fitting::FitsFound;
 use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
 use super::saved::Saved;
+use super::sequencing::SequenceFound;
 use super::tap::Tap;
 use super::ways::WaysFound;
 use crate::kept::Mark;
@@ -66,6 +67,8 @@ pub enum Update {
     },
     /// Fits with one part were searched.
     Fits(FitsFound),
+    /// The steps of the assembly were searched.
+    Sequence(SequenceFound),
     /// The ways of a part in the assembly were searched.
     Ways(WaysFound),
     /// A file was chosen in a dialog.

@@ -27,6 +27,7 @@ use super::notes::Notes;
 use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
 use super::recording::Recording;
+use super::sequencing::Sequencing;
 use super::threads::Cancel;
 use super::tour::Tour;
 use super::verdict::Verdict;
@@ -106,6 +107,8 @@ pub struct Session {
     pub guidance: List,
     /// Fits of a part, found on request.
     pub fitting: Option<Fitting>,
+    /// The steps in which the assembly goes together, found on request.
+    pub sequencing: Sequencing,
     /// The part with which fits are found; `None`: the nearest ones.
     pub partner: Option<usize>,
     /// Messages.
@@ -174,6 +177,7 @@ impl Session {
             guide: GuideSettings::default(),
             guidance: List::default(),
             fitting: None,
+            sequencing: Sequencing::default(),
             partner: None,
             ways: Ways::default(),
             notes: Notes::default(),

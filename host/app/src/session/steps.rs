@@ -104,6 +104,15 @@ impl Steps {
         true
     }
 
+    /// As [`Self::go_on`], whatever parts have moved before and now, as for a slider that moves one after another.
+    pub fn go_on_with_others(&mut self, name: &str, poses: &[DAffine3]) -> bool {
+        if self.to_undo() == Some(name) && poses.len() == self.now.len() {
+            self.undo();
+            self.undone.clear();
+        }
+        self.record(name, poses)
+    }
+
     /// Name of the step that is undone next.
     pub fn to_undo(&self) -> Option<&str> {
         self.done.back().map(|step| step.name.as_str())

@@ -82,6 +82,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
             }
         }
         Update::Fits(found) => session.fits_found(found),
+        Update::Sequence(found) => session.sequencing.take_in(found),
         Update::Ways(found) => session.ways_found(found),
         Update::Chosen(purpose, path) => return Some(answer(purpose, path, true)),
         Update::NoDialog(purpose) => session.wants_path = Some(purpose),

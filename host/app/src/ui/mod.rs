@@ -30,6 +30,7 @@ pub mod plots;
 mod recent;
 mod rig;
 mod section;
+mod sequence;
 #[cfg(unix)]
 pub mod space_mouse;
 mod stop;
@@ -155,7 +156,7 @@ impl Window {
         for button in wanted.pressed {
             match button {
                 0 => self.view.six_axis.switch(),
-                1 => self.view.six_axis.wants_all = true,
+                1 => self.view.wants_all = true,
                 _ => {}
             }
         }
@@ -223,7 +224,7 @@ impl Window {
             .size_range(180.0..=420.0)
             .frame(theme::panel(theme::of(ui)))
             .show(ui, |ui| {
-                below(ui, &mut self.clearances, session, &mut self.view);
+                below(ui, &mut self.clearances, session, &mut self.view, wanted);
                 egui::CentralPanel::default()
                     .frame(egui::Frame::NONE)
                     .show(ui, |ui| {
@@ -287,7 +288,7 @@ impl Window {
             arrange::Tab::View => {}
             arrange::Tab::Rig => rig::show(ui, session, wanted),
             arrange::Tab::Parts => {
-                below(ui, &mut self.clearances, session, &mut self.view);
+                below(ui, &mut self.clearances, session, &mut self.view, wanted);
                 parts::show(
                     ui,
                     session,
@@ -316,12 +317,21 @@ impl Window {
     }
 }
 
-/// Draws the list of clearances at the lower end of the panel of parts.
-fn below(ui: &mut Ui, list: &mut clearances::Clearances, session: &Session, view: &mut Viewpoint) {
+/// Draws the sequence and the list of clearances at the lower end of the panel of parts.
+fn below(
+    ui: &mut Ui,
+    list: &mut clearances::Clearances,
+    session: &Session,
+    view: &mut Viewpoint,
+    wanted: &mut Vec<Intent>,
+) {
     let drawn = egui::Panel::bottom("clearances")
         .resizable(false)
         .frame(egui::Frame::NONE)
-        .show(ui, |ui| list.show(ui, session, view));
+        .show(ui, |ui| {
+            sequence::show(ui, session, view, wanted);
+            list.show(ui, session, view);
+        });
     control::settle(ui, drawn.response.rect.height(), &mut list.height);
 }
 

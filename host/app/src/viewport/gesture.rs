@@ -67,6 +67,8 @@ pub struct Viewpoint {
     pub handles: Handles,
     /// Motion by a six-axis device.
     pub six_axis: SixAxis,
+    /// Whether it is to show everything, once it is drawn.
+    pub wants_all: bool,
     pub(super) goal: Option<Camera>,
     drag: Option<Drag>,
     /// Document at which the camera looks.
@@ -117,7 +119,7 @@ impl Viewpoint {
             (self.picked, self.marked) = (None, Marked::default());
         }
         let typing = ui.ctx().text_edit_focused();
-        let wants_all = std::mem::take(&mut self.six_axis.wants_all);
+        let wants_all = std::mem::take(&mut self.wants_all);
         if wants_all || !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
             self.fit(extent, rect);
         }

@@ -76,8 +76,6 @@ pub struct SixAxis {
     pub is_there: bool,
     /// What the cap is for.
     pub used: Use,
-    /// Whether the view is to show everything, once it is drawn.
-    pub wants_all: bool,
     subject: Option<Subject>,
 }
 

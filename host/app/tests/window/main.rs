@@ -22,6 +22,7 @@ mod project;
 mod recording;
 mod said_once;
 mod section_view;
+mod sequence;
 #[cfg(unix)]
 mod space_mouse;
 mod views;

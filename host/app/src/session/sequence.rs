@@ -1,0 +1,352 @@
+//! The steps in which an assembly goes together, and where its parts are before, between and after them. Pure.
+//!
+//! Parts that are not yet put on stand at the end of their way, far enough from one another to be seen: a part stands farther out than its way leads where it
+//! would be within another part's box there. A group that is put on as one is itself apart before its own steps are done. Lengths are mm.
+
+use glam::{DAffine3, DVec3};
+use mortise_brep::CadModel;
+use mortise_task::{Assembly, Motion};
+
+use mortise_task::report::{self, Sense};
+use mortise_task::sequence::Sequence as Found;
+
+/// Least distance of the boxes of parts that are apart, over the radius of the assembly.
+const BETWEEN: f64 = 0.06;
+/// Speed of a turn beside that of a slide: the share of the assembly's radius that a point is from the axis.
+const ARM: f64 = 0.5;
+
+/// A step: a group of parts is put onto others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// Parts that move.
+    pub parts: Vec<usize>,
+    /// The step in words.
+    pub words: String,
+    /// Way from the place of the parts outwards, to where they stand before the step.
+    way: Vec<Motion>,
+}
+
+/// The steps of an assembly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sequence {
+    /// The steps, in the order of assembly.
+    pub steps: Vec<Step>,
+    /// What was found, in a line.
+    pub verdict: String,
+    /// Parts that do not come apart and what holds them, in words.
+    pub stuck: Vec<String>,
+    /// Poses in the file.
+    file: Vec<DAffine3>,
+    /// Radius of the assembly.
+    radius: f64,
+}
+
+impl Sequence {
+    /// The steps of a sequence that was found for `assembly`. Cost: some microseconds for each pair of parts.
+    pub fn new(assembly: &Assembly, found: &Found) -> Self {
+        let report = report::sequence(assembly, found, Sense::Assembly);
+        let model = &assembly.model;
+        let boxes: Vec<Cuboid> = (0..model.parts.len())
+            .map(|part| Cuboid::of(model, part))
+            .collect();
+        let whole = boxes.iter().copied().reduce(Cuboid::and).unwrap_or_default();
+        let radius = (0.5 * (whole.high - whole.low).length()).max(1e-3);
+        let count = report.steps.len();
+        let (mut now, mut steps) = (boxes, Vec::with_capacity(count));
+        for (step, words) in found.steps.iter().rev().zip(&report.steps) {
+            let mut way = step.path.legs.clone();
+            let end = step.path.poses().pop().unwrap_or(DAffine3::IDENTITY);
+            let moved: Vec<Cuboid> = step.group.iter().map(|part| now[*part].moved(&end)).collect();
+            let others: Vec<Cuboid> = step.onto.iter().map(|part| now[*part]).collect();
+            let last = way.last().map_or(DVec3::ZERO, |leg| leg.slide);
+            let along = last.try_normalize().unwrap_or_else(|| away(&moved, &others));
+            let beyond = along * clear_by(&moved, &others, along, BETWEEN * radius);
+            if beyond != DVec3::ZERO {
+                way.push(Motion::slide(beyond));
+            }
+            for (part, at) in step.group.iter().zip(moved) {
+                now[*part] = at.moved(&DAffine3::from_translation(beyond));
+            }
+            steps.push(Step {
+                parts: step.group.clone(),
+                words: words.words(),
+                way,
+            });
+        }
+        let verdict = match (report.verdict, count) {
+            ("timed_out", _) => format!("The time ended after {count} steps"),
+            ("assembles", 1) => "Goes together in 1 step".to_owned(),
+            ("assembles", _) => format!("Goes together in {count} steps"),
+            _ => "Does not come apart completely".to_owned(),
+        };
+        Self {
+            steps,
+            verdict,
+            stuck: report.stuck.iter().map(|stuck| stuck.words()).collect(),
+            file: model.parts.iter().map(|part| part.placement).collect(),
+            radius,
+        }
+    }
+
+    /// Poses of all parts after `done` steps, with its fraction as the share of the way that the next one has gone.
+    pub fn poses(&self, done: f64) -> Vec<DAffine3> {
+        let mut moved = vec![DAffine3::IDENTITY; self.file.len()];
+        for (i, step) in self.steps.iter().enumerate() {
+            let out = (1.0 - (done - i as f64)).clamp(0.0, 1.0);
+            // Exactly in place where the step is done.
+            if out == 0.0 {
+                continue;
+            }
+            let by = along(&step.way, out, ARM * self.radius);
+            for part in &step.parts {
+                if let Some(moved) = moved.get_mut(*part) {
+                    *moved = by * *moved;
+                }
+            }
+        }
+        let at = |(by, file): (&DAffine3, &DAffine3)| {
+            if *by == DAffine3::IDENTITY {
+                *file
+            } else {
+                super::pose::rigid(&(*by * *file))
+            }
+        };
+        moved.iter().zip(&self.file).map(at).collect()
+    }
+
+    /// Number of steps done with the parts at `poses`: all or none of them; `None` between, and where parts are elsewhere.
+    pub fn done(&self, poses: &[DAffine3]) -> Option<f64> {
+        (poses == self.file).then_some(self.steps.len() as f64)
+    }
+
+    /// The step that is next, or under way, after `done` steps.
+    pub fn next(&self, done: f64) -> Option<&Step> {
+        self.steps.get(done.max(0.0) as usize)
+    }
+}
+
+/// Motion along a way up to a share of its length; a turn counts with this `arm`.
+fn along(way: &[Motion], share: f64, arm: f64) -> DAffine3 {
+    let length = |leg: &Motion| leg.slide.length() + arm * leg.angle.abs();
+    let mut left = share * way.iter().map(length).sum::<f64>();
+    let mut pose = DAffine3::IDENTITY;
+    for leg in way {
+        let own = length(leg);
+        let share = if own > left { left / own } else { 1.0 };
+        pose = leg.at(share) * pose;
+        left -= own;
+        if left <= 0.0 {
+            break;
+        }
+    }
+    pose
+}
+
+/// A box along the axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Cuboid {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Cuboid {
+    fn about(points: impl Iterator<Item = DVec3>) -> Self {
+        points
+            .map(|p| Self { low: p, high: p })
+            .reduce(Self::and)
+            .unwrap_or_default()
+    }
+
+    /// The box of a part where the file has it.
+    fn of(model: &CadModel, part: usize) -> Self {
+        let part = &model.parts[part];
+        let vertices = model.shapes.get(part.shape).map(|shape| &shape.mesh.vertices[..]);
+        Self::about(
+            vertices
+                .unwrap_or_default()
+                .iter()
+                .map(|p| part.placement.transform_point3(*p)),
+        )
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+
+    /// A box about this one, moved.
+    fn moved(&self, by: &DAffine3) -> Self {
+        Self::about((0..8).map(|corner| {
+            let of = |axis: usize| {
+                if corner >> axis & 1 == 1 {
+                    self.high[axis]
+                } else {
+                    self.low[axis]
+                }
+            };
+            by.transform_point3(DVec3::new(of(0), of(1), of(2)))
+        }))
+    }
+
+    /// Travels along a unit direction at which this box is nearer than `between` to another one, from and to.
+    fn meets(&self, other: &Self, along: DVec3, between: f64) -> Option<[f64; 2]> {
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for axis in 0..3 {
+            let before = other.low[axis] - between - self.high[axis];
+            let after = other.high[axis] + between - self.low[axis];
+            if along[axis].abs() < 1e-9 {
+                if before >= 0.0 || after <= 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let [a, b] = [before / along[axis], after / along[axis]];
+            from = from.max(a.min(b));
+            to = to.min(a.max(b));
+        }
+        (from < to && to > 0.0).then_some([from, to])
+    }
+}
+
+/// Least travel along a unit direction after which no box of `moved` is nearer than `between` to one of `others`.
+fn clear_by(moved: &[Cuboid], others: &[Cuboid], along: DVec3, between: f64) -> f64 {
+    let mut meetings: Vec<[f64; 2]> = (moved.iter())
+        .flat_map(|a| others.iter().filter_map(|b| a.meets(b, along, between)))
+        .collect();
+    meetings.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut travel = 0.0;
+    for [from, to] in meetings {
+        if from >= travel && travel > 0.0 || from > travel {
+            break;
+        }
+        travel = to.max(travel);
+    }
+    travel
+}
+
+/// Unit direction from one set of boxes to another.
+fn away(moved: &[Cuboid], from: &[Cuboid]) -> DVec3 {
+    let middle = |of: &[Cuboid]| {
+        let all = of.iter().copied().reduce(Cuboid::and).unwrap_or_default();
+        0.5 * (all.low + all.high)
+    };
+    (middle(moved) - middle(from)).try_normalize().unwrap_or(DVec3::Z)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn sample() -> (Assembly, Sequence) {
+        let document =
+            crate::session::document::Document::sample(1, &|_| std::ops::ControlFlow::Continue(()));
+        let model = document.expect("the sample").model;
+        let assembly = Assembly::new((*model).clone()).expect("an assembly");
+        let found = mortise_task::sequence::disassemble(&assembly, &[0, 1], Duration::from_secs(60));
+        let sequence = Sequence::new(&assembly, &found);
+        (assembly, sequence)
+    }
+
+    #[test]
+    fn the_sample_goes_together_in_a_step_and_is_apart_before_it() {
+        let (assembly, sequence) = sample();
+        assert_eq!(sequence.verdict, "Goes together in 1 step");
+        let file: Vec<DAffine3> = assembly.model.parts.iter().map(|part| part.placement).collect();
+        assert_eq!(sequence.poses(1.0), file);
+        assert_eq!(sequence.poses(7.0), file, "beyond the end");
+        assert_eq!(sequence.done(&file), Some(1.0));
+        let apart = sequence.poses(0.0);
+        assert_eq!(sequence.poses(-3.0), apart, "before the beginning");
+        let [moved] = sequence.next(0.0).expect("a step").parts[..] else {
+            panic!("one part")
+        };
+        let way = apart[moved].translation - file[moved].translation;
+        assert!(way.length() > 1.0);
+        let half = sequence.poses(0.5)[moved].translation - file[moved].translation;
+        assert!((half - 0.5 * way).length() < 1e-9);
+        assert_eq!(sequence.next(1.0), None);
+        let boxes: Vec<Cuboid> = (0..2)
+            .map(|part| {
+                let by = apart[part] * file[part].inverse();
+                Cuboid::of(&assembly.model, part).moved(&by)
+            })
+            .collect();
+        assert!(
+            boxes[0]
+                .meets(&boxes[1], DVec3::Z, 0.0)
+                .is_none_or(|[from, _]| from >= 0.0)
+        );
+    }
+
+    fn cuboid() -> impl Strategy<Value = Cuboid> {
+        let corner = prop::array::uniform3(-10.0f64..10.0);
+        let size = prop::array::uniform3(0.1f64..8.0);
+        (corner, size).prop_map(|(corner, size)| {
+            let low = DVec3::from(corner);
+            Cuboid {
+                low,
+                high: low + DVec3::from(size),
+            }
+        })
+    }
+
+    fn overlap(a: &Cuboid, b: &Cuboid, between: f64) -> bool {
+        a.low.cmplt(b.high + between).all() && b.low.cmplt(a.high + between).all()
+    }
+
+    proptest! {
+        /// After the travel the boxes are apart, and after none of a hundred shorter ones.
+        #[test]
+        fn boxes_travel_as_far_as_they_must(
+            moved in prop::collection::vec(cuboid(), 1..4),
+            others in prop::collection::vec(cuboid(), 1..6),
+            direction in prop_oneof![
+                Just(DVec3::Z),
+                Just(DVec3::NEG_X),
+                prop::array::uniform3(-1.0f64..1.0).prop_map(|d| DVec3::from(d).try_normalize().unwrap_or(DVec3::Y)),
+            ],
+            between in 0.0f64..1.0,
+        ) {
+            let travel = clear_by(&moved, &others, direction, between);
+            let meets = |travel: f64| {
+                let by = DAffine3::from_translation(travel * direction);
+                let at: Vec<Cuboid> = moved.iter().map(|a| a.moved(&by)).collect();
+                at.iter().any(|a| others.iter().any(|b| overlap(a, b, between)))
+            };
+            prop_assert!(!meets(travel + 1e-9), "{travel}");
+            for share in 0..100 {
+                let shorter = 0.01 * f64::from(share) * travel;
+                prop_assert!(travel < 1e-6 || meets(shorter), "{shorter} of {travel}");
+            }
+        }
+
+        /// A way of slides and turns is gone along without jumps, from its start to its end.
+        #[test]
+        fn a_way_is_continuous(
+            legs in prop::collection::vec((prop::array::uniform3(-20.0f64..20.0), -3.0f64..3.0), 1..5),
+        ) {
+            let way: Vec<Motion> = legs
+                .iter()
+                .map(|(slide, angle)| Motion { slide: DVec3::from(*slide), point: DVec3::X, axis: DVec3::Z, angle: *angle })
+                .collect();
+            let end = way.iter().fold(DAffine3::IDENTITY, |pose, leg| leg.at(1.0) * pose);
+            prop_assert_eq!(along(&way, 0.0, 10.0), DAffine3::IDENTITY);
+            prop_assert!(along(&way, 1.0, 10.0).abs_diff_eq(end, 1e-9));
+            let total: f64 = way.iter().map(|leg| leg.slide.length() + 10.0 * leg.angle.abs()).sum();
+            let at = |share: f64| along(&way, share, 10.0).transform_point3(DVec3::new(1.0, 10.0, 0.0));
+            let places: Vec<DVec3> = (0..=50).map(|i| at(f64::from(i) / 50.0)).collect();
+            // A point at the arm from the axis has the same speed all along; one farther out is faster in turns.
+            let arm = places.iter().map(|p| (*p - DVec3::X).truncate().length()).fold(10.0, f64::max);
+            let most = total / 50.0 * arm / 10.0;
+            for pair in places.windows(2) {
+                prop_assert!(pair[0].distance(pair[1]) <= 1.2 * most + 1e-9, "{pair:?} {most}");
+            }
+        }
+    }
+}

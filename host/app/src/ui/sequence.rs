@@ -1,0 +1,172 @@
+//! The steps in which the assembly goes together, under the parts, folded until they are opened: searched on request; a slider takes the parts apart and puts
+//! them together, a click on a step goes to where it begins.
+
+use std::time::Duration;
+
+use egui::{
+    Button, CollapsingHeader, Color32, CornerRadius, Label, RichText, Role, ScrollArea, Sense, Slider, Ui,
+    Vec2, WidgetInfo,
+};
+
+use super::{control, theme};
+use crate::session::sequence::Sequence;
+use crate::session::{Intent, Session, obstacle};
+use crate::viewport::gesture::Viewpoint;
+
+/// Largest height of the list, points.
+const LIST_HEIGHT: f32 = 150.0;
+/// Time between two pictures of a search, which shows the time passed.
+const TICK: Duration = Duration::from_millis(500);
+
+/// Draws the section.
+pub fn show(ui: &mut Ui, session: &Session, view: &mut Viewpoint, wanted: &mut Vec<Intent>) {
+    ui.take_available_width();
+    if session.document.is_none() {
+        return;
+    }
+    let heading = RichText::new("Sequence")
+        .size(12.5)
+        .color(theme::of(ui).text_weak);
+    CollapsingHeader::new(heading)
+        .default_open(false)
+        .show(ui, |ui| contents(ui, session, view, wanted));
+}
+
+fn contents(ui: &mut Ui, session: &Session, view: &mut Viewpoint, wanted: &mut Vec<Intent>) {
+    let Some(document) = &session.document else { return };
+    request(ui, session, wanted);
+    if let Some(why) = session.sequencing.failure(document) {
+        ui.label(RichText::new(why).size(12.0).color(theme::of(ui).fault_text));
+    }
+    let Some(found) = session.sequencing.found(document) else {
+        return;
+    };
+    ui.add(Label::new(RichText::new(&found.verdict).color(theme::of(ui).text_strong)).truncate());
+    for stuck in &found.stuck {
+        ui.label(RichText::new(stuck).size(12.0).color(theme::of(ui).warning));
+    }
+    if found.steps.is_empty() {
+        return;
+    }
+    let done = session.sequencing.done(document);
+    slide(ui, session, found, done, view, wanted);
+    list(ui, session, found, done, wanted);
+}
+
+fn request(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    ui.horizontal(|ui| match session.sequencing.since() {
+        None => {
+            let button = Button::new(RichText::new("Find the steps").size(12.5));
+            let hint =
+                "Search an order and ways in which the parts go together without overlap, up to a minute";
+            control::intent_button(ui, session, wanted, button, Intent::FindSequence, hint);
+        }
+        Some(since) => {
+            let seconds = since.elapsed().as_secs();
+            ui.label(RichText::new(format!("Searching, {seconds} s")).size(12.5));
+            let button = Button::new(RichText::new("Cancel").size(12.5));
+            control::intent_button(ui, session, wanted, button, Intent::CancelSequence, "")
+                .accessible_name("Cancel search for the steps");
+            ui.ctx().request_repaint_after(TICK);
+        }
+    });
+}
+
+/// The slider from apart to together, and its ends.
+fn slide(
+    ui: &mut Ui,
+    session: &Session,
+    found: &Sequence,
+    done: Option<f64>,
+    view: &mut Viewpoint,
+    wanted: &mut Vec<Intent>,
+) {
+    let count = found.steps.len() as f64;
+    let whole = |done: f64| Intent::GoToStep { done, goes_on: false };
+    let mut value = done.unwrap_or(count);
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let mut end = |ui: &mut Ui, text: &str, done: f64, hint: &str| {
+            let button = Button::new(RichText::new(text).size(12.5));
+            let response = control::intent_button(ui, session, wanted, button, whole(done), hint);
+            view.wants_all |= response.clicked();
+        };
+        end(ui, "Apart", 0.0, "Move every part to the start of its way");
+        end(ui, "Together", count, "Move every part to its place");
+        let before = (value - 1.0).ceil().max(0.0);
+        end(ui, "Back", before, "Take the last part off again");
+        let after = (value + 1.0).floor().min(count);
+        end(ui, "On", after, "Put the next part on");
+    });
+    let why = obstacle(session, &whole(value));
+    ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(40.0);
+    let slider = Slider::new(&mut value, 0.0..=count)
+        .show_value(false)
+        .smart_aim(false);
+    let response = ui
+        .add_enabled(why.is_none(), slider)
+        .accessible_name("Steps done")
+        .on_hover_text(
+            "Left: apart. Right: together. The parts are moved, so a hand can take the next one from there",
+        );
+    if response.changed() {
+        let goes_on = response.dragged() && !response.drag_started();
+        wanted.push(Intent::GoToStep { done: value, goes_on });
+    }
+    if let Some(why) = why {
+        response.on_disabled_hover_text(why);
+    }
+    let text = match done {
+        Some(done) if done >= count => "All parts are in place".to_owned(),
+        Some(done) => format!("{} of {count} steps done", done.floor()),
+        None => "Parts have been moved otherwise".to_owned(),
+    };
+    ui.label(RichText::new(text).size(12.0).color(theme::of(ui).text_weak));
+}
+
+fn list(ui: &mut Ui, session: &Session, found: &Sequence, done: Option<f64>, wanted: &mut Vec<Intent>) {
+    let next = done.map(|done| done as usize);
+    ScrollArea::vertical()
+        .id_salt("sequence")
+        .auto_shrink([false, true])
+        .max_height(LIST_HEIGHT)
+        .min_scrolled_height(LIST_HEIGHT)
+        .show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 2.0;
+            for (i, step) in found.steps.iter().enumerate() {
+                let text = format!("{}. {}", i + 1, step.words);
+                if line(ui, &text, next == Some(i)) {
+                    let intent = Intent::GoToStep {
+                        done: i as f64,
+                        goes_on: false,
+                    };
+                    if obstacle(session, &intent).is_none() {
+                        wanted.push(intent);
+                    }
+                }
+            }
+        });
+}
+
+/// Draws one step; returns whether it was clicked.
+fn line(ui: &mut Ui, text: &str, is_next: bool) -> bool {
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 22.0), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, is_next, text));
+    let ink = theme::of(ui);
+    let painter = ui.painter_at(rect);
+    let fill = match (is_next, response.hovered()) {
+        (true, _) => ink.accent_dim.gamma_multiply(0.8),
+        (_, true) => ink.card,
+        _ => Color32::TRANSPARENT,
+    };
+    painter.rect_filled(rect, CornerRadius::same(6), fill);
+    let format = egui::TextFormat::simple(egui::FontId::proportional(12.5), ink.text_strong);
+    let mut job = egui::text::LayoutJob::single_section(text.to_owned(), format);
+    job.wrap = egui::text::TextWrapping::truncate_at_width((rect.width() - 12.0).max(10.0));
+    let galley = painter.layout_job(job);
+    let at = egui::Pos2::new(rect.left() + 6.0, rect.center().y - 0.5 * galley.size().y);
+    painter.galley(at, galley, ink.text_strong);
+    let clicked = response.clicked();
+    response.on_hover_text(format!("{text}; a click goes to where this step begins"));
+    clicked
+}

@@ -1,0 +1,90 @@
+//! The steps in which an assembly goes together, in the running window.
+
+use crate::common::{arm, click, connect, harness, open_sample, poses, until};
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use mortise::session::{Intent, obstacle};
+use mortise::ui::Window;
+
+/// The sample, with its steps found.
+fn found() -> Harness<'static, Window> {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let session = &harness.state().session;
+    let none = Intent::GoToStep {
+        done: 0.0,
+        goes_on: false,
+    };
+    assert_eq!(obstacle(session, &none).as_deref(), Some("Find the steps first"));
+    click(&mut harness, "Sequence");
+    harness.run_steps(10);
+    click(&mut harness, "Find the steps");
+    until(&mut harness, "the steps are found", |session| {
+        (session.document.as_ref()).is_some_and(|document| session.sequencing.found(document).is_some())
+    });
+    harness.run_steps(5);
+    harness
+}
+
+#[test]
+fn the_assembly_is_taken_apart_and_put_together_by_steps() {
+    let mut harness = found();
+    let _ = harness.get_by_label("Goes together in 1 step");
+    let _ = harness.get_by_label("All parts are in place");
+    let before = poses(&harness);
+    click(&mut harness, "Apart");
+    harness.run_steps(3);
+    let apart = poses(&harness);
+    let moved: Vec<usize> = (0..2).filter(|i| apart[*i] != before[*i]).collect();
+    let [moving] = moved[..] else { panic!("{moved:?}") };
+    assert!(apart[moving].translation.distance(before[moving].translation) > 5.0);
+    let _ = harness.get_by_label("0 of 1 steps done");
+    assert_eq!(
+        harness.state().session.selected,
+        Some(moving),
+        "what is put on next"
+    );
+    // A key on the slider moves it a little on, and one step of the history takes all of that back.
+    harness.get_by_label("Steps done").focus();
+    for _ in 0..3 {
+        harness.key_press(Key::ArrowRight);
+        harness.run_steps(2);
+    }
+    let between = poses(&harness);
+    assert_ne!(between, apart);
+    assert_ne!(between, before);
+    click(&mut harness, "On");
+    harness.run_steps(3);
+    assert_eq!(poses(&harness), before, "exactly in place");
+    let session = &harness.state().session;
+    let document = session.document.as_ref().expect("open");
+    let steps = session.sequencing.found(document).map(|found| &found.steps);
+    let line = format!("1. {}", steps.expect("found")[0].words);
+    harness.get_by_label(&line).click();
+    harness.run_steps(3);
+    assert_eq!(poses(&harness), apart, "a step begins with its parts apart");
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    harness.run_steps(3);
+    assert_eq!(poses(&harness), before);
+}
+
+#[test]
+fn a_hand_takes_a_part_from_where_a_step_has_it_and_no_step_moves_what_it_holds() {
+    let mut harness = found();
+    click(&mut harness, "Apart");
+    let apart = poses(&harness);
+    connect(&mut harness);
+    arm(&mut harness);
+    let document = harness.state().session.document.as_ref().expect("open");
+    let off = |a: &[glam::DAffine3], b: &[glam::DAffine3]| {
+        let each = a
+            .iter()
+            .zip(b)
+            .map(|(a, b)| a.translation.distance(b.translation));
+        each.fold(0.0, f64::max)
+    };
+    assert!(off(&document.poses, &apart) < 1e-3, "where the board has them");
+    assert!(harness.get_by_label("Together").accesskit_node().is_disabled());
+    assert!(harness.get_by_label("Steps done").accesskit_node().is_disabled());
+}
