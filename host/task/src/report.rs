@@ -71,12 +71,16 @@ pub struct StepReport<'a> {
 }
 
 impl StepReport<'_> {
-    /// The step in words: what moves, along which direction, and how near it passes.
-    pub fn words(&self) -> String {
-        let way = match self.direction {
+    /// How it moves first, in words.
+    pub fn way(&self) -> String {
+        match self.direction {
             Some(d) => format!("along {}", direction(d)),
             None => "by a turn".into(),
-        };
+        }
+    }
+
+    /// The step in words: what moves, along which direction, and how near it passes.
+    pub fn words(&self) -> String {
         let gap = match (self.overlap_um, self.clearance_um) {
             (Some(overlap), _) if overlap > 0.05 => format!("overlap {overlap:.1} µm"),
             (Some(_), Some(clearance)) => format!("clearance {clearance:.1} µm"),
@@ -88,7 +92,7 @@ impl StepReport<'_> {
         } else {
             String::new()
         };
-        format!("{} {way}{legs}: {gap}", self.moving.join(", "))
+        format!("{} {}{legs}: {gap}", self.moving.join(", "), self.way())
     }
 }
 

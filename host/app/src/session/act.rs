@@ -38,6 +38,10 @@ impl Session {
     /// Actions that follow from the state: history of moves; upload; next step of a demonstration.
     fn follow(&mut self) {
         self.watch_moves();
+        // While the motors are on the parts move in every frame, and no step can be gone to.
+        if let (false, Some(document)) = (self.is_armed(), &self.document) {
+            self.sequencing.follow(document);
+        }
         self.upload_if_due();
         self.seek_ways();
         advance(self);

@@ -26,9 +26,10 @@ pub struct SequenceFound {
     result: Result<Sequence, String>,
 }
 
-/// Where the window has put the parts.
+/// Where the parts are.
 struct Shown {
-    done: f64,
+    /// Number of steps done, with a share of the next one; `None` where the parts are elsewhere.
+    done: Option<f64>,
     poses: Vec<DAffine3>,
 }
 
@@ -65,12 +66,19 @@ impl Sequencing {
     }
 
     /// Number of steps done, with a share of the next one; `None` where the parts are elsewhere.
-    pub fn done(&self, document: &Document) -> Option<f64> {
-        let shown = self.shown.as_ref().filter(|shown| shown.poses == document.poses);
-        match shown {
-            Some(shown) => Some(shown.done),
-            None => self.found(document)?.done(&document.poses),
+    pub fn done(&self) -> Option<f64> {
+        self.shown.as_ref()?.done
+    }
+
+    /// Follows parts that were moved otherwise, as by undo.
+    pub(super) fn follow(&mut self, document: &Document) {
+        if (self.shown.as_ref()).is_some_and(|shown| shown.poses == document.poses) {
+            return;
         }
+        self.shown = self.found(document).map(|found| Shown {
+            done: found.done(&document.poses),
+            poses: document.poses.clone(),
+        });
     }
 
     /// Forgets the search under way: its thread ends by itself.
@@ -129,7 +137,10 @@ impl Session {
         if next.is_some() {
             self.selected = next;
         }
-        self.sequencing.shown = Some(Shown { done, poses });
+        self.sequencing.shown = Some(Shown {
+            done: Some(done),
+            poses,
+        });
     }
 }
 

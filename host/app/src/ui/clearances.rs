@@ -2,12 +2,9 @@
 
 use std::sync::Arc;
 
-use egui::{
-    Button, CollapsingHeader, Color32, CornerRadius, DragValue, RichText, Role, ScrollArea, Sense, Ui, Vec2,
-    WidgetInfo,
-};
+use egui::{Button, CollapsingHeader, DragValue, RichText, ScrollArea, Ui};
 
-use super::theme;
+use super::{control, theme};
 use crate::session::Session;
 use crate::session::clearances::{self, Near, Search};
 use crate::session::document::Document;
@@ -119,39 +116,17 @@ impl Clearances {
 /// Draws one pair; returns whether it was clicked.
 fn line(ui: &mut Ui, document: &Document, pair: &Near, chosen: bool) -> bool {
     let [a, b] = pair.parts.map(|part| document.part_name(part));
-    let words = pair.words();
-    let text = format!("{a} – {b}");
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
-    let named = format!("{text}: {words}");
-    response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, chosen, &named));
-    let ink = theme::of(ui);
-    let painter = ui.painter_at(rect);
-    let fill = match (chosen, response.hovered()) {
-        (true, _) => ink.accent_dim.gamma_multiply(0.8),
-        (_, true) => ink.card,
-        _ => Color32::TRANSPARENT,
-    };
-    painter.rect_filled(rect, CornerRadius::same(6), fill);
-    let color = if pair.clashes() { ink.contact } else { ink.text };
-    let value = painter.text(
-        rect.right_center() - Vec2::new(6.0, 0.0),
-        egui::Align2::RIGHT_CENTER,
-        words,
-        egui::FontId::proportional(12.5),
-        color,
-    );
-    let mut job = egui::text::LayoutJob::single_section(
-        text,
-        egui::TextFormat::simple(egui::FontId::proportional(12.5), ink.text_strong),
-    );
-    job.wrap = egui::text::TextWrapping::truncate_at_width((value.left() - rect.left() - 14.0).max(10.0));
-    let galley = painter.layout_job(job);
-    let at = egui::Pos2::new(rect.left() + 6.0, rect.center().y - 0.5 * galley.size().y);
-    painter.galley(at, galley, ink.text_strong);
+    let (left, right) = (format!("{a} – {b}"), pair.words());
+    let named = format!("{left}: {right}");
     let [x, y, z] = pair.place.to_array();
-    let clicked = response.clicked();
-    response.on_hover_text(format!(
-        "{named}, at {x:.3}, {y:.3}, {z:.3} mm; a click shows it and marks both parts"
-    ));
-    clicked
+    let ink = theme::of(ui);
+    let line = control::Line {
+        left,
+        right,
+        color: if pair.clashes() { ink.contact } else { ink.text },
+        hint: format!("{named}, at {x:.3}, {y:.3}, {z:.3} mm; a click shows it and marks both parts"),
+        named,
+        chosen,
+    };
+    line.show(ui)
 }

@@ -2,8 +2,8 @@
 
 use egui::text::{LayoutJob, TextWrapping};
 use egui::{
-    Align2, Button, Color32, CornerRadius, FontId, Response, RichText, Role, Sense, Stroke, Ui, Vec2,
-    WidgetInfo,
+    Align2, Button, Color32, CornerRadius, FontId, Pos2, Response, RichText, Role, Sense, Stroke, TextFormat,
+    Ui, Vec2, WidgetInfo,
 };
 
 use super::theme;
@@ -27,6 +27,50 @@ pub fn intent_button(
         Some(reason) => response.on_disabled_hover_text(reason),
         None if hint.is_empty() => response,
         None => response.on_hover_text(hint),
+    }
+}
+
+/// A line of a list that can be chosen: a text and a value.
+pub struct Line {
+    /// The text, which is cut where there is no room.
+    pub left: String,
+    /// The value.
+    pub right: String,
+    /// Colour of the value.
+    pub color: Color32,
+    /// Name for programs that read the window.
+    pub named: String,
+    /// Hover text.
+    pub hint: String,
+    /// Whether it is the chosen one.
+    pub chosen: bool,
+}
+
+impl Line {
+    /// Draws it; returns whether it was clicked.
+    pub fn show(self, ui: &mut Ui) -> bool {
+        let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
+        response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, self.chosen, &self.named));
+        let ink = theme::of(ui);
+        let painter = ui.painter_at(rect);
+        let fill = match (self.chosen, response.hovered()) {
+            (true, _) => ink.accent_dim.gamma_multiply(0.8),
+            (_, true) => ink.card,
+            _ => Color32::TRANSPARENT,
+        };
+        painter.rect_filled(rect, CornerRadius::same(6), fill);
+        let font = FontId::proportional(12.5);
+        let end = rect.right_center() - Vec2::new(6.0, 0.0);
+        let value = painter.text(end, Align2::RIGHT_CENTER, self.right, font.clone(), self.color);
+        let format = TextFormat::simple(font, ink.text_strong);
+        let mut job = LayoutJob::single_section(self.left, format);
+        job.wrap = TextWrapping::truncate_at_width((value.left() - rect.left() - 14.0).max(10.0));
+        let galley = painter.layout_job(job);
+        let at = Pos2::new(rect.left() + 6.0, rect.center().y - 0.5 * galley.size().y);
+        painter.galley(at, galley, ink.text_strong);
+        let clicked = response.clicked();
+        response.on_hover_text(self.hint);
+        clicked
     }
 }
 

@@ -109,6 +109,7 @@ impl Window {
     /// Draws one frame. `surface` draws the 3D view where there is a graphics device.
     pub fn show(&mut self, ui: &mut Ui, surface: Option<&mut Surface>) {
         self.session.poll();
+        self.view.begin();
         self.clearances.poll();
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
@@ -139,6 +140,9 @@ impl Window {
             self.session.act(intent);
         }
         self.keep(ui.ctx());
+        if self.view.wants_all {
+            ui.ctx().request_repaint();
+        }
         if !matches!(self.session.link, Link::None) {
             // A request without delay would draw two frames.
             ui.ctx().request_repaint_after(CALM);

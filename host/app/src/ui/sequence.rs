@@ -3,10 +3,7 @@
 
 use std::time::Duration;
 
-use egui::{
-    Button, CollapsingHeader, Color32, CornerRadius, Label, RichText, Role, ScrollArea, Sense, Slider, Ui,
-    Vec2, WidgetInfo,
-};
+use egui::{Button, CollapsingHeader, Label, RichText, ScrollArea, Slider, Ui};
 
 use super::{control, theme};
 use crate::session::sequence::Sequence;
@@ -48,7 +45,7 @@ fn contents(ui: &mut Ui, session: &Session, view: &mut Viewpoint, wanted: &mut V
     if found.steps.is_empty() {
         return;
     }
-    let done = session.sequencing.done(document);
+    let done = session.sequencing.done();
     slide(ui, session, found, done, view, wanted);
     list(ui, session, found, done, wanted);
 }
@@ -86,17 +83,17 @@ fn slide(
     let mut value = done.unwrap_or(count);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let mut end = |ui: &mut Ui, text: &str, done: f64, hint: &str| {
+        let mut go = |ui: &mut Ui, text: &str, done: f64, hint: &str| {
             let button = Button::new(RichText::new(text).size(12.5));
-            let response = control::intent_button(ui, session, wanted, button, whole(done), hint);
-            view.wants_all |= response.clicked();
+            control::intent_button(ui, session, wanted, button, whole(done), hint)
         };
-        end(ui, "Apart", 0.0, "Move every part to the start of its way");
-        end(ui, "Together", count, "Move every part to its place");
+        let apart = go(ui, "Apart", 0.0, "Move every part to the start of its way");
+        let together = go(ui, "Together", count, "Move every part to its place");
+        view.wants_all |= apart.clicked() || together.clicked();
         let before = (value - 1.0).ceil().max(0.0);
-        end(ui, "Back", before, "Take the last part off again");
+        go(ui, "‹", before, "Take the last part off again").accessible_name("Step back");
         let after = (value + 1.0).floor().min(count);
-        end(ui, "On", after, "Put the next part on");
+        go(ui, "›", after, "Put the next part on").accessible_name("Step on");
     });
     let why = obstacle(session, &whole(value));
     ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(40.0);
@@ -134,8 +131,17 @@ fn list(ui: &mut Ui, session: &Session, found: &Sequence, done: Option<f64>, wan
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 2.0;
             for (i, step) in found.steps.iter().enumerate() {
-                let text = format!("{}. {}", i + 1, step.words);
-                if line(ui, &text, next == Some(i)) {
+                let number = i + 1;
+                let named = format!("{number}. {}", step.words);
+                let line = control::Line {
+                    left: format!("{number}. {}", step.names),
+                    right: step.side.clone(),
+                    color: theme::of(ui).text,
+                    hint: format!("{named}; a click goes to where this step begins"),
+                    named,
+                    chosen: next == Some(i),
+                };
+                if line.show(ui) {
                     let intent = Intent::GoToStep {
                         done: i as f64,
                         goes_on: false,
@@ -146,27 +152,4 @@ fn list(ui: &mut Ui, session: &Session, found: &Sequence, done: Option<f64>, wan
                 }
             }
         });
-}
-
-/// Draws one step; returns whether it was clicked.
-fn line(ui: &mut Ui, text: &str, is_next: bool) -> bool {
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 22.0), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, is_next, text));
-    let ink = theme::of(ui);
-    let painter = ui.painter_at(rect);
-    let fill = match (is_next, response.hovered()) {
-        (true, _) => ink.accent_dim.gamma_multiply(0.8),
-        (_, true) => ink.card,
-        _ => Color32::TRANSPARENT,
-    };
-    painter.rect_filled(rect, CornerRadius::same(6), fill);
-    let format = egui::TextFormat::simple(egui::FontId::proportional(12.5), ink.text_strong);
-    let mut job = egui::text::LayoutJob::single_section(text.to_owned(), format);
-    job.wrap = egui::text::TextWrapping::truncate_at_width((rect.width() - 12.0).max(10.0));
-    let galley = painter.layout_job(job);
-    let at = egui::Pos2::new(rect.left() + 6.0, rect.center().y - 0.5 * galley.size().y);
-    painter.galley(at, galley, ink.text_strong);
-    let clicked = response.clicked();
-    response.on_hover_text(format!("{text}; a click goes to where this step begins"));
-    clicked
 }

@@ -67,8 +67,10 @@ pub struct Viewpoint {
     pub handles: Handles,
     /// Motion by a six-axis device.
     pub six_axis: SixAxis,
-    /// Whether it is to show everything, once it is drawn.
+    /// Whether it is to show everything from the next frame on.
     pub wants_all: bool,
+    /// Whether it is to show everything in this frame.
+    shows_all: bool,
     pub(super) goal: Option<Camera>,
     drag: Option<Drag>,
     /// Document at which the camera looks.
@@ -76,6 +78,11 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
+    /// Begins a frame, by which what was wanted in the one before has been done.
+    pub fn begin(&mut self) {
+        self.shows_all |= std::mem::take(&mut self.wants_all);
+    }
+
     /// Moves smoothly until everything is visible.
     pub fn fit(&mut self, extent: Extent, rect: Rect) {
         let mut goal = self.goal.unwrap_or(self.camera);
@@ -119,8 +126,8 @@ impl Viewpoint {
             (self.picked, self.marked) = (None, Marked::default());
         }
         let typing = ui.ctx().text_edit_focused();
-        let wants_all = std::mem::take(&mut self.wants_all);
-        if wants_all || !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
+        let shows_all = std::mem::take(&mut self.shows_all);
+        if shows_all || !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
             self.fit(extent, rect);
         }
         if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::X)) {

@@ -40,6 +40,11 @@ fn the_assembly_is_taken_apart_and_put_together_by_steps() {
     let [moving] = moved[..] else { panic!("{moved:?}") };
     assert!(apart[moving].translation.distance(before[moving].translation) > 5.0);
     let _ = harness.get_by_label("0 of 1 steps done");
+    harness.run_steps(40);
+    let window = harness.state();
+    let extent = window.session.document.as_ref().expect("open").extent;
+    let off = window.view.camera.target.distance(extent.center);
+    assert!(off < 0.01 * extent.radius, "all of it is seen: {off}");
     assert_eq!(
         harness.state().session.selected,
         Some(moving),
@@ -54,7 +59,7 @@ fn the_assembly_is_taken_apart_and_put_together_by_steps() {
     let between = poses(&harness);
     assert_ne!(between, apart);
     assert_ne!(between, before);
-    click(&mut harness, "On");
+    click(&mut harness, "Step on");
     harness.run_steps(3);
     assert_eq!(poses(&harness), before, "exactly in place");
     let session = &harness.state().session;
@@ -67,6 +72,7 @@ fn the_assembly_is_taken_apart_and_put_together_by_steps() {
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     harness.run_steps(3);
     assert_eq!(poses(&harness), before);
+    let _ = harness.get_by_label("All parts are in place");
 }
 
 #[test]
