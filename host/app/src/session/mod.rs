@@ -42,6 +42,7 @@ pub mod sequence;
 pub mod sequencing;
 mod state;
 pub mod steps;
+mod taking_apart;
 pub mod tap;
 pub mod threads;
 pub mod touch;

@@ -119,6 +119,7 @@ fn opened(session: &mut Session, Imported { document, saved }: Imported) {
     }
     session.selected = None;
     session.drop_fits();
+    session.sequencing.cancel();
     session.ways.clear();
     session.partner = None;
     session.verdict = None;

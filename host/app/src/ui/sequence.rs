@@ -106,8 +106,15 @@ fn slide(
         .on_hover_text(
             "Left: apart. Right: together. The parts are moved, so a hand can take the next one from there",
         );
+    // All of a drag is one step of the history, which begins with its first motion.
+    let has_moved = response.id.with("has moved");
+    if response.drag_started() {
+        ui.data_mut(|data| data.remove::<bool>(has_moved));
+    }
     if response.changed() {
-        let goes_on = response.dragged() && !response.drag_started();
+        let dragged = response.dragged();
+        let goes_on = dragged && ui.data(|data| data.get_temp(has_moved).unwrap_or(false));
+        ui.data_mut(|data| data.insert_temp(has_moved, dragged));
         wanted.push(Intent::GoToStep { done: value, goes_on });
     }
     if let Some(why) = why {

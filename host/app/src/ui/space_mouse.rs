@@ -38,7 +38,7 @@ enum Event {
     Pressed(i32),
 }
 
-/// State of the device, as far as the daemon has told it.
+/// State of the device, as far as the daemon has reported it.
 #[derive(Debug, Default)]
 struct Heard {
     /// Whether there is a daemon.
@@ -244,7 +244,7 @@ mod tests {
         );
         let second = mouse.frame(after(40), true);
         assert_eq!((second.deflection, second.seconds), (deflection, 0.04));
-        assert!(second.pressed.is_empty(), "told once");
+        assert!(second.pressed.is_empty(), "reported once");
         assert!(mouse.frame(after(50), false).deflection.is_rest());
         assert_eq!(mouse.frame(after(60), true).seconds, 0.0, "begins anew");
         assert!(mouse.frame(after(301), true).deflection.is_rest());

@@ -17,5 +17,6 @@ pub mod screen;
 pub mod six_axis;
 pub mod snap;
 mod solids;
+mod steer;
 pub mod surface;
 mod turn;

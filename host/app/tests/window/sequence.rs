@@ -50,15 +50,30 @@ fn the_assembly_is_taken_apart_and_put_together_by_steps() {
         Some(moving),
         "what is put on next"
     );
-    // A key on the slider moves it a little on, and one step of the history takes all of that back.
-    harness.get_by_label("Steps done").focus();
-    for _ in 0..3 {
-        harness.key_press(Key::ArrowRight);
-        harness.run_steps(2);
+    // All of a drag of the slider is undone at once, and no more than that.
+    let slider = harness.get_by_label("Steps done").rect();
+    let at = |share: f32| {
+        egui::pos2(
+            slider.left() + 8.0 + share * (slider.width() - 16.0),
+            slider.center().y,
+        )
+    };
+    harness.hover_at(at(0.0));
+    harness.step();
+    harness.drag_at(at(0.0));
+    harness.step();
+    for part in 1..=5 {
+        harness.hover_at(at(0.1 * part as f32));
+        harness.step();
     }
+    harness.drop_at(at(0.5));
+    harness.run_steps(3);
     let between = poses(&harness);
     assert_ne!(between, apart);
     assert_ne!(between, before);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    harness.run_steps(3);
+    assert_eq!(poses(&harness), apart);
     click(&mut harness, "Step on");
     harness.run_steps(3);
     assert_eq!(poses(&harness), before, "exactly in place");

@@ -1,0 +1,64 @@
+//! Searching the steps in which the open assembly goes together, beside the window's thread, and putting the parts where they are at one of them.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use mortise_brep::CadModel;
+use mortise_task::{Assembly, sequence};
+
+use super::outbox::Update;
+use super::sequence::Sequence;
+use super::sequencing::SequenceFound;
+use super::state::Session;
+use super::threads::spawn;
+
+/// Longest search.
+const LONGEST: Duration = Duration::from_secs(60);
+/// Name of a step of the history.
+const NAME: &str = "go to a step of the sequence";
+
+impl Session {
+    /// Starts the search, which must be possible.
+    pub(super) fn find_sequence(&mut self) {
+        let Some(document) = &self.document else { return };
+        let id = self.sequencing.begin(document.generation);
+        let (model, outbox) = (Arc::clone(&document.model), self.outbox.clone());
+        spawn("mortise-sequence", move || {
+            let result = search(&model);
+            outbox.send(Update::Sequence(SequenceFound { id, result }));
+        });
+    }
+
+    /// Puts the parts where they are after so many steps, which must be possible, and selects what is put on next.
+    pub(super) fn go_to_step(&mut self, done: f64, goes_on: bool) {
+        let Some(document) = &self.document else { return };
+        let Some(found) = self.sequencing.found(document) else {
+            return;
+        };
+        let done = if done.is_finite() { done } else { 0.0 };
+        let done = done.clamp(0.0, found.steps.len() as f64);
+        let (poses, next) = (
+            found.poses(done),
+            found.next(done).and_then(|step| step.parts.first().copied()),
+        );
+        self.tour = None;
+        self.place(poses.clone());
+        if goes_on {
+            self.moves.steps.go_on_with_others(NAME, &poses);
+        } else {
+            self.note_step(NAME);
+        }
+        if next.is_some() {
+            self.selected = next;
+        }
+        self.sequencing.put(done, poses);
+    }
+}
+
+/// The steps of a model. Cost: seconds, at most [`LONGEST`] and some.
+fn search(model: &CadModel) -> Result<Sequence, String> {
+    let assembly = Assembly::new(model.clone()).map_err(|error| error.to_string())?;
+    let all: Vec<usize> = (0..assembly.count()).collect();
+    let found = sequence::disassemble(&assembly, &all, LONGEST);
+    Ok(Sequence::new(&assembly, &found))
+}
