@@ -126,7 +126,7 @@ impl Sequence {
     }
 
     /// Number of steps done with the parts at `poses`, a whole one; `None` between them, and where parts are elsewhere. Of an assembly with more than
-    /// [`MOST`] parts in all of its steps only the ends are known. Cost: some microseconds a step, for each step.
+    /// 1000 steps times parts only the ends are known. Cost: some microseconds a step, for each step.
     pub fn done(&self, poses: &[DAffine3]) -> Option<f64> {
         let count = self.steps.len();
         let each = if count * self.file.len() <= MOST {

@@ -2,7 +2,7 @@
 //!
 //! The daemon sends packets of eight 32-bit numbers over a local socket: the kind (0 motion, 1 button pressed, 2 released), then for a motion the deflection
 //! along x (right), y (up), z (away from the viewer), about x, y and z, and the time since the last one; for a button its number. A deflection of about
-//! [`FULL`] is full. Source: proto.h, spnav.c and util.c of libspnav 1.2; protocol version 0, which a client speaks that asks for no other.
+//! 350 is full. Source: proto.h, spnav.c and util.c of libspnav 1.2; protocol version 0, which a client speaks that asks for no other.
 
 use std::io::Read as _;
 use std::os::unix::net::UnixStream;
@@ -76,7 +76,7 @@ impl SpaceMouse {
     }
 
     /// Follows a daemon that has its socket at one of these places, on a thread of its own, until this is dropped. Without a daemon it is looked for again
-    /// every [`AGAIN`].
+    /// every five seconds.
     pub fn follow_at(ctx: &Context, places: Vec<PathBuf>) -> Self {
         let heard = Arc::new(Mutex::new(Heard::default()));
         let (kept, ctx) = (Arc::downgrade(&heard), ctx.clone());
