@@ -15,8 +15,8 @@ const BETWEEN: f64 = 0.06;
 /// Speed of a turn beside that of a slide: the share of the assembly's radius that a point is from the axis.
 const ARM: f64 = 0.5;
 
-/// Poses differ by less, mm and as components of unit vectors, where they were kept in a file.
-const SAME_MM: f64 = 1e-6;
+/// Poses differ by less, mm and as components of unit vectors, where they come back from a file or a board.
+const SAME_MM: f64 = 1e-3;
 /// See [`Sequence::done`].
 const MOST: usize = 1000;
 
@@ -134,10 +134,7 @@ impl Sequence {
         } else {
             count.max(1)
         };
-        let is_at = |done: f64| {
-            let there = self.poses(done);
-            there.len() == poses.len() && there.iter().zip(poses).all(|(a, b)| a.abs_diff_eq(*b, SAME_MM))
-        };
+        let is_at = |done: f64| are_same(&self.poses(done), poses);
         (0..=count)
             .rev()
             .step_by(each)
@@ -149,6 +146,11 @@ impl Sequence {
     pub fn next(&self, done: f64) -> Option<&Step> {
         self.steps.get(done.max(0.0) as usize)
     }
+}
+
+/// Whether all parts are at the same poses, but for the rounding of a file or a board.
+pub(super) fn are_same(a: &[DAffine3], b: &[DAffine3]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.abs_diff_eq(*b, SAME_MM))
 }
 
 /// Motion along a way up to a share of its length; a turn counts with this `arm`.

@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::DAffine3;
 
 use super::document::Document;
-use super::sequence::Sequence;
+use super::sequence::{Sequence, are_same};
 
 /// What a search found.
 pub struct SequenceFound {
@@ -61,7 +61,7 @@ impl Sequencing {
 
     /// Follows parts that were moved otherwise, as by undo.
     pub(super) fn follow(&mut self, document: &Document) {
-        if (self.shown.as_ref()).is_some_and(|shown| shown.poses == document.poses) {
+        if (self.shown.as_ref()).is_some_and(|shown| are_same(&shown.poses, &document.poses)) {
             return;
         }
         self.shown = self.found(document).map(|found| Shown {

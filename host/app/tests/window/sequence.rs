@@ -96,6 +96,8 @@ fn a_hand_takes_a_part_from_where_a_step_has_it_and_no_step_moves_what_it_holds(
     click(&mut harness, "Apart");
     let apart = poses(&harness);
     connect(&mut harness);
+    harness.run_steps(20);
+    let _ = harness.get_by_label("0 of 1 steps done");
     arm(&mut harness);
     let document = harness.state().session.document.as_ref().expect("open");
     let off = |a: &[glam::DAffine3], b: &[glam::DAffine3]| {
