@@ -4,17 +4,14 @@
 //! would be within another part's box there. A group that is put on as one is itself apart before its own steps are done. Lengths are mm.
 
 use glam::{DAffine3, DVec3};
-use mortise_brep::CadModel;
-use mortise_task::{Assembly, Motion};
-
 use mortise_task::report::{self, Sense};
 use mortise_task::sequence::Sequence as Found;
+use mortise_task::{Assembly, Motion};
 
 /// Least distance of the boxes of parts that are apart, over the radius of the assembly.
 const BETWEEN: f64 = 0.06;
 /// Speed of a turn beside that of a slide: the share of the assembly's radius that a point is from the axis.
 const ARM: f64 = 0.5;
-
 /// Poses differ by less, mm and as components of unit vectors, where they come back from a file or a board.
 const SAME_MM: f64 = 1e-3;
 /// See [`Sequence::done`].
@@ -27,7 +24,7 @@ pub struct Step {
     pub parts: Vec<usize>,
     /// Their names.
     pub names: String,
-    /// How they move first, seen from their place: the side from which they come.
+    /// First direction of the way out, in words.
     pub side: String,
     /// The step in words.
     pub words: String,
@@ -51,30 +48,33 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// The steps of a sequence that was found for `assembly`. Cost: some microseconds for each pair of parts.
+    /// The steps of a sequence that was found for `assembly`. Cost: a comparison of two boxes for each pair of parts.
     pub fn new(assembly: &Assembly, found: &Found) -> Self {
         let report = report::sequence(assembly, found, Sense::Assembly);
-        let model = &assembly.model;
-        let boxes: Vec<Cuboid> = (0..model.parts.len())
-            .map(|part| Cuboid::of(model, part))
-            .collect();
-        let whole = boxes.iter().copied().reduce(Cuboid::and).unwrap_or_default();
-        let radius = (0.5 * (whole.high - whole.low).length()).max(1e-3);
+        let all: Vec<usize> = (0..assembly.count()).collect();
+        let (low, high) = assembly.bounds_of(&all, DAffine3::IDENTITY);
+        let radius = (0.5 * low.distance(high)).max(1e-3);
         let count = report.steps.len();
-        let (mut now, mut steps) = (boxes, Vec::with_capacity(count));
+        // What each part has been moved by so far, from where the file has it.
+        let (mut by, mut steps) = (vec![DAffine3::IDENTITY; all.len()], Vec::with_capacity(count));
         for (step, words) in found.steps.iter().rev().zip(&report.steps) {
             let mut way = step.path.legs.clone();
             let end = step.path.poses().pop().unwrap_or(DAffine3::IDENTITY);
-            let moved: Vec<Cuboid> = step.group.iter().map(|part| now[*part].moved(&end)).collect();
-            let others: Vec<Cuboid> = step.onto.iter().map(|part| now[*part]).collect();
+            for part in &step.group {
+                by[*part] = end * by[*part];
+            }
+            let boxes = |of: &[usize]| -> Vec<Bounds> {
+                of.iter().map(|part| assembly.bounds(*part, by[*part])).collect()
+            };
+            let (moved, others) = (boxes(&step.group), boxes(&step.onto));
             let last = way.last().map_or(DVec3::ZERO, |leg| leg.slide);
-            let along = last.try_normalize().unwrap_or_else(|| away(&moved, &others));
+            let along = last.try_normalize().unwrap_or(DVec3::Z);
             let beyond = along * clear_by(&moved, &others, along, BETWEEN * radius);
             if beyond != DVec3::ZERO {
                 way.push(Motion::slide(beyond));
-            }
-            for (part, at) in step.group.iter().zip(moved) {
-                now[*part] = at.moved(&DAffine3::from_translation(beyond));
+                for part in &step.group {
+                    by[*part].translation += beyond;
+                }
             }
             steps.push(Step {
                 parts: step.group.clone(),
@@ -94,7 +94,7 @@ impl Sequence {
             steps,
             verdict,
             stuck: report.stuck.iter().map(|stuck| stuck.words()).collect(),
-            file: model.parts.iter().map(|part| part.placement).collect(),
+            file: all.iter().map(|part| assembly.placement(*part)).collect(),
             radius,
         }
     }
@@ -170,115 +170,66 @@ fn along(way: &[Motion], share: f64, arm: f64) -> DAffine3 {
     pose
 }
 
-/// A box along the axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Cuboid {
-    low: DVec3,
-    high: DVec3,
-}
+/// Low and high corner of a box along the axes.
+type Bounds = (DVec3, DVec3);
 
-impl Cuboid {
-    fn about(points: impl Iterator<Item = DVec3>) -> Self {
-        points
-            .map(|p| Self { low: p, high: p })
-            .reduce(Self::and)
-            .unwrap_or_default()
-    }
-
-    /// The box of a part where the file has it.
-    fn of(model: &CadModel, part: usize) -> Self {
-        let part = &model.parts[part];
-        let vertices = model.shapes.get(part.shape).map(|shape| &shape.mesh.vertices[..]);
-        Self::about(
-            vertices
-                .unwrap_or_default()
-                .iter()
-                .map(|p| part.placement.transform_point3(*p)),
-        )
-    }
-
-    fn and(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
-    }
-
-    /// A box about this one, moved.
-    fn moved(&self, by: &DAffine3) -> Self {
-        Self::about((0..8).map(|corner| {
-            let of = |axis: usize| {
-                if corner >> axis & 1 == 1 {
-                    self.high[axis]
-                } else {
-                    self.low[axis]
-                }
-            };
-            by.transform_point3(DVec3::new(of(0), of(1), of(2)))
-        }))
-    }
-
-    /// Travels along a unit direction at which this box is nearer than `between` to another one, from and to.
-    fn meets(&self, other: &Self, along: DVec3, between: f64) -> Option<[f64; 2]> {
-        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
-        for axis in 0..3 {
-            let before = other.low[axis] - between - self.high[axis];
-            let after = other.high[axis] + between - self.low[axis];
-            if along[axis].abs() < 1e-9 {
-                if before >= 0.0 || after <= 0.0 {
-                    return None;
-                }
-                continue;
+/// Travels along a unit direction at which a box is nearer than `between` to another one, from and to; `None` where that is over before it begins.
+fn meets(own: &Bounds, other: &Bounds, along: DVec3, between: f64) -> Option<[f64; 2]> {
+    let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+    for axis in 0..3 {
+        let before = other.0[axis] - between - own.1[axis];
+        let after = other.1[axis] + between - own.0[axis];
+        if along[axis].abs() < 1e-9 {
+            if before >= 0.0 || after <= 0.0 {
+                return None;
             }
-            let [a, b] = [before / along[axis], after / along[axis]];
-            from = from.max(a.min(b));
-            to = to.min(a.max(b));
+            continue;
         }
-        (from < to && to > 0.0).then_some([from, to])
+        let [a, b] = [before / along[axis], after / along[axis]];
+        from = from.max(a.min(b));
+        to = to.min(a.max(b));
     }
+    (from < to && to > 0.0).then_some([from, to])
 }
 
 /// Least travel along a unit direction after which no box of `moved` is nearer than `between` to one of `others`.
-fn clear_by(moved: &[Cuboid], others: &[Cuboid], along: DVec3, between: f64) -> f64 {
+fn clear_by(moved: &[Bounds], others: &[Bounds], along: DVec3, between: f64) -> f64 {
     let mut meetings: Vec<[f64; 2]> = (moved.iter())
-        .flat_map(|a| others.iter().filter_map(|b| a.meets(b, along, between)))
+        .flat_map(|a| others.iter().filter_map(|b| meets(a, b, along, between)))
         .collect();
     meetings.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let mut travel = 0.0;
+    let mut travel: f64 = 0.0;
     for [from, to] in meetings {
-        if from >= travel && travel > 0.0 || from > travel {
+        if from >= travel {
             break;
         }
-        travel = to.max(travel);
+        travel = travel.max(to);
     }
     travel
 }
 
-/// Unit direction from one set of boxes to another.
-fn away(moved: &[Cuboid], from: &[Cuboid]) -> DVec3 {
-    let middle = |of: &[Cuboid]| {
-        let all = of.iter().copied().reduce(Cuboid::and).unwrap_or_default();
-        0.5 * (all.low + all.high)
-    };
-    (middle(moved) - middle(from)).try_normalize().unwrap_or(DVec3::Z)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
     use std::time::Duration;
 
+    use mortise_brep::CadModel;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::session::document::Document;
 
-    fn sample() -> (Assembly, Sequence) {
-        let document =
-            crate::session::document::Document::sample(1, &|_| std::ops::ControlFlow::Continue(()));
-        let model = document.expect("the sample").model;
-        let assembly = Assembly::new((*model).clone()).expect("an assembly");
-        let found = mortise_task::sequence::disassemble(&assembly, &[0, 1], Duration::from_secs(60));
+    fn taken_apart(model: CadModel) -> (Assembly, Sequence) {
+        let assembly = Assembly::new(model).expect("an assembly");
+        let all: Vec<usize> = (0..assembly.count()).collect();
+        let found = mortise_task::sequence::disassemble(&assembly, &all, Duration::from_secs(60));
         let sequence = Sequence::new(&assembly, &found);
         (assembly, sequence)
+    }
+
+    fn sample() -> (Assembly, Sequence) {
+        let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
+        taken_apart((*document.model).clone())
     }
 
     #[test]
@@ -301,33 +252,50 @@ mod tests {
         let half = sequence.poses(0.5)[moved].translation - file[moved].translation;
         assert!((half - 0.5 * way).length() < 1e-9);
         assert_eq!(sequence.next(1.0), None);
-        let boxes: Vec<Cuboid> = (0..2)
-            .map(|part| {
-                let by = apart[part] * file[part].inverse();
-                Cuboid::of(&assembly.model, part).moved(&by)
-            })
-            .collect();
-        assert!(
-            boxes[0]
-                .meets(&boxes[1], DVec3::Z, 0.0)
-                .is_none_or(|[from, _]| from >= 0.0)
-        );
     }
 
-    fn cuboid() -> impl Strategy<Value = Cuboid> {
+    /// Of files with several parts: no two are nearer than their boxes are to be once all are off, and each step is clear of those that follow.
+    #[test]
+    fn parts_that_are_off_stand_apart() {
+        for file in [
+            "lab/data/fixture_row.step",
+            "mating/tests/data/two_pin_exact.step",
+        ] {
+            let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("..")
+                .join(file);
+            let model = mortise_brep::load_step(&file).expect("a file of the repository");
+            let (assembly, sequence) = taken_apart(model);
+            let count = assembly.count();
+            assert_eq!(sequence.steps.len(), count - 1, "{}", sequence.verdict);
+            let apart = sequence.poses(0.0);
+            let boxes: Vec<Bounds> = (0..count)
+                .map(|part| assembly.bounds(part, apart[part] * sequence.file[part].inverse()))
+                .collect();
+            for (a, b) in (0..count).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                let near = overlap(&boxes[a], &boxes[b], 0.999 * BETWEEN * sequence.radius);
+                assert!(
+                    !near,
+                    "{} and {} of {}",
+                    assembly.name(a),
+                    assembly.name(b),
+                    file.display()
+                );
+            }
+        }
+    }
+
+    fn cuboid() -> impl Strategy<Value = Bounds> {
         let corner = prop::array::uniform3(-10.0f64..10.0);
         let size = prop::array::uniform3(0.1f64..8.0);
         (corner, size).prop_map(|(corner, size)| {
             let low = DVec3::from(corner);
-            Cuboid {
-                low,
-                high: low + DVec3::from(size),
-            }
+            (low, low + DVec3::from(size))
         })
     }
 
-    fn overlap(a: &Cuboid, b: &Cuboid, between: f64) -> bool {
-        a.low.cmplt(b.high + between).all() && b.low.cmplt(a.high + between).all()
+    fn overlap(a: &Bounds, b: &Bounds, between: f64) -> bool {
+        a.0.cmplt(b.1 + between).all() && b.0.cmplt(a.1 + between).all()
     }
 
     proptest! {
@@ -345,8 +313,8 @@ mod tests {
         ) {
             let travel = clear_by(&moved, &others, direction, between);
             let meets = |travel: f64| {
-                let by = DAffine3::from_translation(travel * direction);
-                let at: Vec<Cuboid> = moved.iter().map(|a| a.moved(&by)).collect();
+                let by = travel * direction;
+                let at: Vec<Bounds> = moved.iter().map(|a| (a.0 + by, a.1 + by)).collect();
                 at.iter().any(|a| others.iter().any(|b| overlap(a, b, between)))
             };
             prop_assert!(!meets(travel + 1e-9), "{travel}");

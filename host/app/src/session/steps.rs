@@ -104,13 +104,21 @@ impl Steps {
         true
     }
 
-    /// As [`Self::go_on`], whatever parts have moved before and now, as for a slider that moves one after another.
-    pub fn go_on_with_others(&mut self, name: &str, poses: &[DAffine3]) -> bool {
-        if self.to_undo() == Some(name) && poses.len() == self.now.len() {
-            self.undo();
-            self.undone.clear();
+    /// As [`Self::go_on`], whatever parts have moved before and now, as for a slider that moves one after another. A step that leads back to where it began
+    /// stays, so that what follows does not go on with the step before it.
+    pub fn go_on_with_others(&mut self, name: &str, poses: &[DAffine3]) {
+        if self.to_undo() != Some(name) || poses.len() != self.now.len() {
+            self.record(name, poses);
+            return;
         }
-        self.record(name, poses)
+        self.undo();
+        self.undone.clear();
+        if !self.record(name, poses) {
+            self.done.push_back(Step {
+                name: name.to_owned(),
+                changes: Vec::new(),
+            });
+        }
     }
 
     /// Name of the step that is undone next.
@@ -192,6 +200,22 @@ mod tests {
         assert_eq!(undone, [at(10.0), at(10.0), at(0.0)]);
         while steps.redo().is_some() {}
         assert_eq!(steps.poses(), [at(11.0), at(2.0)]);
+    }
+
+    /// The slider moves one part after the other, back to where it began, and on again.
+    #[test]
+    fn a_slider_that_is_dragged_is_one_step() {
+        let mut steps = Steps::beginning(&[at(0.0), at(0.0)]);
+        assert!(steps.record("slide", &[at(1.0), at(0.0)]));
+        assert!(steps.record("slide", &[at(2.0), at(0.0)]));
+        for poses in [[3.0, 0.0], [3.0, 1.0], [2.0, 0.0], [1.0, 0.0], [1.0, 5.0]] {
+            steps.go_on_with_others("slide", &poses.map(at));
+            assert_eq!(steps.poses(), poses.map(at));
+        }
+        assert_eq!(steps.undo().as_deref(), Some("slide"));
+        assert_eq!(steps.poses(), [at(1.0), at(0.0)], "no more than the drag");
+        assert_eq!(steps.redo().as_deref(), Some("slide"));
+        assert_eq!(steps.poses(), [at(1.0), at(5.0)]);
     }
 
     #[test]

@@ -101,7 +101,7 @@ impl SpaceMouse {
         lock(&self.heard).is_there
     }
 
-    /// What it wants of a frame at `now`. While the window `has_focus` not, nothing: the daemon tells every program.
+    /// What it wants of a frame at `now`: nothing unless the window has the focus, because the daemon sends to every program.
     pub fn frame(&mut self, now: Instant, has_focus: bool) -> Wanted {
         let mut heard = lock(&self.heard);
         let is_fresh = heard

@@ -261,7 +261,6 @@ const VERBS: &[&str] = &[
     "Solve",
     "Sort",
     "Speed",
-    "Spend",
     "Split",
     "Stabilise",
     "Start",
