@@ -26,5 +26,9 @@ pub const MAX_INPUT_FAULTS: usize = 8;
 pub const MAX_LOG: usize = 256;
 /// Joints with motors in a rig's description.
 pub const MAX_JOINTS: usize = 3;
+/// Encoders in a rig's description: one for each joint, then those of a wrist.
+pub const MAX_ENCODERS: usize = MAX_JOINTS + 3;
+/// Smallest and largest force at the handle in a motor's test, N.
+pub const MOTOR_TEST_FORCE: [f32; 2] = [0.1, 2.0];
 /// Characters of a board's or firmware's name.
 pub const MAX_NAME: usize = 32;

@@ -8,6 +8,7 @@ mod constraint;
 mod fault;
 mod flags;
 mod inputs;
+mod motor_test;
 mod rigid;
 
 use heapless::{String, Vec};
@@ -24,6 +25,7 @@ pub use self::constraint::{ConstraintKind, ConstraintTarget, Feature, Path, Path
 pub use self::fault::Fault;
 pub use self::flags::{FlagRow, Flags};
 pub use self::inputs::{DriverReport, Inputs, TickInput};
+pub use self::motor_test::{MotorTest, Readings};
 pub use self::rigid::{WirePose, WireTwist, WireWrench};
 
 /// Hash of the schemas of both message enums and of the bounds of their lists: any change to a message changes it.
@@ -191,6 +193,17 @@ pub enum ToDevice {
     GetRig,
     /// Send the inputs of every tick as [`FromDevice::Inputs`], or no longer. Ends with the session.
     RecordInputs(bool),
+    /// Query [`FromDevice::Readings`].
+    GetReadings,
+    /// Push with a single motor for a moment, to learn which encoder follows and in which sense. Only while idle;
+    /// needs no scene. Answered by [`FromDevice::MotorTested`] when the motors are off again.
+    TestMotor {
+        /// Joint, from 0.
+        joint: u8,
+        /// Force at the handle at the push's peak, N: positive pushes the joint forward as its description says. Its size is within
+        /// [`MOTOR_TEST_FORCE`].
+        force: f32,
+    },
 }
 
 impl ToDevice {
@@ -207,7 +220,8 @@ impl ToDevice {
             | Self::SceneBegin { .. }
             | Self::SceneCommit
             | Self::Restart
-            | Self::SetRig(_) => true,
+            | Self::SetRig(_)
+            | Self::TestMotor { .. } => true,
             Self::Hello(_)
             | Self::GetCapabilities
             | Self::Disarm
@@ -228,7 +242,8 @@ impl ToDevice {
             | Self::Lockstep(_)
             | Self::Run { .. }
             | Self::GetRig
-            | Self::RecordInputs(_) => false,
+            | Self::RecordInputs(_)
+            | Self::GetReadings => false,
         }
     }
 }
@@ -295,6 +310,10 @@ pub enum FromDevice {
     },
     /// Inputs of consecutive ticks.
     Inputs(Inputs),
+    /// Readings of encoders and safety inputs.
+    Readings(Readings),
+    /// The motor was tested; it is off again.
+    MotorTested(MotorTest),
 }
 
 /// Capabilities of a board.
@@ -385,6 +404,8 @@ pub enum DeviceState {
     Stopped,
     /// Motors off until the cause is gone and the fault is cleared.
     Fault(Fault),
+    /// A single motor is tested.
+    Testing,
 }
 
 /// Why a message was not executed.
@@ -463,6 +484,11 @@ pub enum Refusal {
     RigDamaged,
     /// The command carries no stamp of this session, or one already seen, or the board has stopped or faulted since it arrived.
     Outdated,
+    /// The mechanism has no such motor that can be tested.
+    NoSuchMotor {
+        /// Motors that can be tested; none without a description.
+        motors: u8,
+    },
 }
 
 /// Two faces that touch.
@@ -642,6 +668,32 @@ pub enum InputFaultKind {
     StopOpen,
     /// The supply is too low.
     SupplyLow,
+    /// An encoder is wired so that it counts in this sense, whatever the description says. Mechanisms with a description alone, as the next three.
+    EncoderSense {
+        /// Axis.
+        axis: u8,
+        /// Down when the axis turns forward.
+        reversed: bool,
+    },
+    /// A motor is wired so that it pushes in this sense, whatever the description says.
+    MotorSense {
+        /// Axis.
+        axis: u8,
+        /// Backward under a positive current.
+        reversed: bool,
+    },
+    /// A motor gives no torque: its wire is broken.
+    MotorDead {
+        /// Axis.
+        axis: u8,
+    },
+    /// Two encoders are plugged into each other's place.
+    EncodersSwapped {
+        /// One.
+        axis: u8,
+        /// The other.
+        with: u8,
+    },
 }
 
 #[cfg(test)]

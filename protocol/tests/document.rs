@@ -61,6 +61,7 @@ fn the_page_has_the_limits_of_the_code() {
         ("MAX_INPUT_FAULTS", limits::MAX_INPUT_FAULTS),
         ("MAX_LOG", limits::MAX_LOG),
         ("MAX_JOINTS", limits::MAX_JOINTS),
+        ("MAX_ENCODERS", limits::MAX_ENCODERS),
         ("MAX_NAME", limits::MAX_NAME),
     ];
     let found: Vec<(String, String)> = table("Limits")

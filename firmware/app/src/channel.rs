@@ -11,7 +11,8 @@ use mortise_haptics::State as LawState;
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{
-    ConstraintTarget, DeviceState, Fault, HandScript, InputFault, Refusal, Statistics, Telemetry, TickInput,
+    ConstraintTarget, DeviceState, Fault, HandScript, InputFault, MotorTest, Readings, Refusal, Statistics,
+    Telemetry, TickInput,
 };
 use mortise_protocol::parameter::ParameterId;
 
@@ -109,6 +110,15 @@ pub enum CommandKind<'s> {
     Restart,
     /// Report the inputs of every tick, or no longer.
     RecordInputs(bool),
+    /// Reply with the readings of encoders and safety inputs.
+    Readings,
+    /// Test a motor; answered by [`Reply::Tested`] at the end of the test.
+    TestMotor {
+        /// Joint, from 0.
+        joint: u8,
+        /// Force at the handle at the push's peak, N.
+        force: f32,
+    },
 }
 
 /// Inputs of a tick, for a recording.
@@ -179,6 +189,10 @@ pub enum Reply {
     },
     /// Answer to [`CommandKind::Restart`]: no motor is driven from here on until a new session begins.
     MayRestart,
+    /// Answer to [`CommandKind::Readings`].
+    Readings(Readings),
+    /// Answer to [`CommandKind::TestMotor`].
+    Tested(MotorTest),
     /// Answer to [`CommandKind::Run`].
     Ran {
         /// Ticks since start.
@@ -195,7 +209,7 @@ pub struct Shared {
     stops: AtomicU32,
     /// Stops and faults so far. Incremented by the control plane.
     halts: AtomicU32,
-    /// `Arm` commands processed. Incremented by the control plane.
+    /// Commands processed that can drive the motors: `Arm` and `TestMotor`. Incremented by the control plane.
     arms: AtomicU32,
     /// Sessions begun by a host's `Hello`.
     sessions: AtomicU32,
@@ -238,12 +252,12 @@ impl Shared {
         }
     }
 
-    /// `Arm` commands processed so far, whatever their outcome.
+    /// Commands to arm or to test a motor processed so far, whatever their outcome.
     pub fn arms(&self) -> u32 {
         self.arms.load(Ordering::Acquire)
     }
 
-    /// Counts an `Arm` command. Called by the control plane after it was processed.
+    /// Counts a command that can drive the motors. Called by the control plane after it was processed.
     pub(crate) fn count_arm(&self) {
         self.arms.fetch_add(1, Ordering::AcqRel);
     }

@@ -16,7 +16,7 @@ use heapless::String;
 use mortise_mechanism::kinematics::Model;
 use mortise_protocol::frame::{Decoder, FrameError, Received, encode};
 use mortise_protocol::image::LAYOUT_VERSION;
-use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS, MAX_TICKS};
+use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS, MAX_TICKS, MOTOR_TEST_FORCE};
 use mortise_protocol::message::{
     Capabilities, DeviceState, Fault, FromDevice, Refusal, Statistics, ToDevice, Version,
 };
@@ -52,7 +52,7 @@ pub struct LinkPlane<'c, 's, F> {
     answers: Answers,
     /// [`Shared::epoch`] when the message being handled arrived.
     epoch: Epoch,
-    /// `Arm` commands passed to the control plane.
+    /// Commands that can drive the motors, passed to the control plane.
     arms: u32,
     state: DeviceState,
     /// Sequence number of the commit that awaits the control plane, and the session it belongs to.
@@ -352,6 +352,15 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                 self.arms = self.arms.wrapping_add(1);
                 return Ok(None);
             }
+            ToDevice::TestMotor { joint, force } => {
+                self.may_drive()?;
+                if !(MOTOR_TEST_FORCE[0]..=MOTOR_TEST_FORCE[1]).contains(&force.abs()) {
+                    return Err(Refusal::BadNumber);
+                }
+                self.enqueue(seq, CommandKind::TestMotor { joint, force })?;
+                self.arms = self.arms.wrapping_add(1);
+                return Ok(None);
+            }
             ToDevice::SetParameter { id, value } => {
                 let parameters = self.parameters.with(id, value)?;
                 let settings = parameters.settings()?;
@@ -384,6 +393,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::Run { ticks } => CommandKind::Run(ticks),
             ToDevice::Restart => CommandKind::Restart,
             ToDevice::RecordInputs(on) => CommandKind::RecordInputs(on),
+            ToDevice::GetReadings => CommandKind::Readings,
         };
         self.enqueue(seq, kind)?;
         Ok(None)
@@ -402,15 +412,16 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
     /// The refusal for a message that requires the motors off.
     fn refused_by_motors(&self) -> Refusal {
         match self.state {
-            DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop => Refusal::State(self.state),
+            DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop | DeviceState::Testing => {
+                Refusal::State(self.state)
+            }
             // The change of state has not arrived here yet.
             _ => Refusal::Busy,
         }
     }
 
-    /// Number of the scene in use, after verifying its checksum. Reads all of it, about 10 instructions per byte, only while no motor is driven and
-    /// none can be before this returns.
-    fn checked_scene(&mut self) -> Result<u32, Refusal> {
+    /// Whether a command may be passed on that drives the motors of a known mechanism: no motor is driven, and none can be before this returns.
+    fn may_drive(&self) -> Result<(), Refusal> {
         if self.store.busy() || self.restarting || self.arms != self.ends.shared.arms() {
             return Err(Refusal::Busy);
         }
@@ -423,9 +434,12 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             Kept::Nothing => self.simulated || !self.described,
             Kept::Damaged => false,
         };
-        if !known {
-            return Err(Refusal::RigDamaged);
-        }
+        if known { Ok(()) } else { Err(Refusal::RigDamaged) }
+    }
+
+    /// Number of the scene in use, after verifying its checksum. Reads all of it, about 10 instructions per byte, only while no motor is driven.
+    fn checked_scene(&mut self) -> Result<u32, Refusal> {
+        self.may_drive()?;
         let number = self.store.current().ok_or(Refusal::NoScene)?.sequence;
         if !self.store.is_sound() {
             self.enqueue(0, CommandKind::SceneDamaged)?;
@@ -485,6 +499,8 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                 FromDevice::Ack { seq }
             }
             Reply::Refused(reason) => FromDevice::Refused { seq, reason },
+            Reply::Readings(readings) => FromDevice::Readings(readings),
+            Reply::Tested(test) => FromDevice::MotorTested(test),
             Reply::Ran { tick, state_hash } => FromDevice::Ran { tick, state_hash },
             Reply::Parameter { id, value } => FromDevice::Parameter { id, value },
             Reply::Statistics { statistics, reset } => {

@@ -24,6 +24,8 @@ pub enum Safety {
     Stopped,
     /// Motors off until the cause is gone and the fault is cleared.
     Fault(Fault),
+    /// A single motor pushes for a moment, with nothing grabbed.
+    Testing,
 }
 
 /// State that follows a soft stop.
@@ -46,6 +48,8 @@ pub enum Motors {
     Rendered,
     /// Driven with the fading last wrench and damping.
     Fading,
+    /// One motor driven with the pulse of its test, the others with zero current.
+    Tested,
 }
 
 /// Input of the state machine.
@@ -81,6 +85,13 @@ pub enum Event {
     Fault(Fault),
     /// The fade has ended.
     SoftStopOver,
+    /// The host requests the test of a motor.
+    Test {
+        /// The encoders have a reference.
+        referenced: bool,
+    },
+    /// The test has ended.
+    TestOver,
 }
 
 /// Action of a plane on entering the new state.
@@ -122,6 +133,7 @@ impl Safety {
             Self::SoftStop(_) => DeviceState::SoftStop,
             Self::Stopped => DeviceState::Stopped,
             Self::Fault(fault) => DeviceState::Fault(fault),
+            Self::Testing => DeviceState::Testing,
         }
     }
 
@@ -132,6 +144,7 @@ impl Safety {
             Self::Armed => Motors::Zero,
             Self::Active => Motors::Rendered,
             Self::SoftStop(_) => Motors::Fading,
+            Self::Testing => Motors::Tested,
         }
     }
 
@@ -182,6 +195,12 @@ impl Safety {
             (Active, Event::Release) => (Armed, Action::Uncouple),
             (Armed, Event::Release) => (self, Action::None),
 
+            (Idle, Event::Test { referenced: true }) => (Testing, Action::Enable),
+            (Idle, Event::Test { .. }) => (self, Action::Refuse(Refusal::State(DeviceState::Homing))),
+            // Its force is small and it moves slowly: off at once.
+            (Testing, Event::TestOver | Event::Disarm) => (Idle, Action::Off),
+            (_, Event::TestOver) => (self, Action::None),
+
             (Armed | Active, Event::Disarm) => (SoftStop(AfterSoftStop::Idle), Action::Fade),
             (_, Event::Disarm) => (self, Action::None),
 
@@ -193,9 +212,10 @@ impl Safety {
             (SoftStop(AfterSoftStop::Fault(fault)), Event::SoftStopOver) => (Fault(fault), Action::Off),
             (_, Event::SoftStopOver) => (self, Action::None),
 
-            (_, Event::Arm { .. } | Event::Grab | Event::Release | Event::Clear { .. }) => {
-                (self, Action::Refuse(Refusal::State(self.reported())))
-            }
+            (
+                _,
+                Event::Arm { .. } | Event::Grab | Event::Release | Event::Clear { .. } | Event::Test { .. },
+            ) => (self, Action::Refuse(Refusal::State(self.reported()))),
         }
     }
 }
@@ -212,7 +232,7 @@ mod tests {
     const FADING: Fault = Fault::HostSilent { silent_ms: 500 };
     const SUDDEN: Fault = Fault::StopInput;
 
-    const STATES: [(&str, Safety); 9] = [
+    const STATES: [(&str, Safety); 10] = [
         ("Boot", Safety::Boot),
         ("Homing", Safety::Homing),
         ("Idle", Safety::Idle),
@@ -225,6 +245,7 @@ mod tests {
         ),
         ("Stopped", Safety::Stopped),
         ("Fault", Safety::Fault(Fault::OverSpeed)),
+        ("Testing", Safety::Testing),
     ];
 
     const ARM: Event = Event::Arm {
@@ -232,7 +253,9 @@ mod tests {
         referenced: true,
     };
 
-    const EVENTS: [(&str, Event); 15] = [
+    const TEST: Event = Event::Test { referenced: true };
+
+    const EVENTS: [(&str, Event); 18] = [
         ("ready", Event::Ready),
         ("reference known", Event::Referenced),
         ("reference lost", Event::ReferenceLost),
@@ -260,6 +283,9 @@ mod tests {
         ("fading fault", Event::Fault(FADING)),
         ("sudden fault", Event::Fault(SUDDEN)),
         ("fade over", Event::SoftStopOver),
+        ("test a motor", TEST),
+        ("test a motor, no reference", Event::Test { referenced: false }),
+        ("test over", Event::TestOver),
     ];
 
     fn name(state: Safety) -> &'static str {
@@ -272,6 +298,7 @@ mod tests {
             Safety::SoftStop(_) => "SoftStop",
             Safety::Stopped => "Stopped",
             Safety::Fault(_) => "Fault",
+            Safety::Testing => "Testing",
         }
     }
 
@@ -307,13 +334,18 @@ mod tests {
     }
 
     #[test]
-    fn motors_come_alive_only_by_arming_from_idle_with_scene_and_reference() {
+    fn motors_come_alive_only_from_idle_with_a_reference_by_arming_with_a_scene_or_for_a_test() {
         for (_, state) in STATES {
             for (what, event) in EVENTS {
                 let (next, action) = state.step(event);
                 if !state.live() && next.live() {
-                    assert_eq!((state, event), (Safety::Idle, ARM), "{what}");
-                    assert_eq!(action, Action::Enable);
+                    assert_eq!(state, Safety::Idle, "{what}");
+                    let expected = match event {
+                        ARM => Safety::Armed,
+                        TEST => Safety::Testing,
+                        _ => panic!("{what} drives the motors"),
+                    };
+                    assert_eq!((next, action), (expected, Action::Enable));
                 }
             }
         }
@@ -376,6 +408,7 @@ mod tests {
                     Safety::SoftStop(AfterSoftStop::Fault(first)) if fading => {
                         Safety::SoftStop(AfterSoftStop::Fault(first))
                     }
+                    Safety::Testing => Safety::Fault(fault),
                     _ if fading && state.live() => Safety::SoftStop(AfterSoftStop::Fault(fault)),
                     _ => Safety::Fault(fault),
                 };

@@ -45,7 +45,11 @@ pub fn check_input_faults(faults: &[InputFault]) -> Result<(), Refusal> {
         | InputFaultKind::EncoderStuck { axis }
         | InputFaultKind::Driver { axis }
         | InputFaultKind::OverCurrent { axis }
-        | InputFaultKind::OverTemperature { axis } => usize::from(axis) < AXES,
+        | InputFaultKind::OverTemperature { axis }
+        | InputFaultKind::EncoderSense { axis, .. }
+        | InputFaultKind::MotorSense { axis, .. }
+        | InputFaultKind::MotorDead { axis } => usize::from(axis) < AXES,
+        InputFaultKind::EncodersSwapped { axis, with } => usize::from(axis.max(with)) < AXES,
         InputFaultKind::NotANumber | InputFaultKind::StopOpen | InputFaultKind::SupplyLow => true,
     };
     if faults.iter().all(possible) {

@@ -1,10 +1,11 @@
-//! Conversions between the force law's types and those of the message table.
+//! Conversions between the types of the force law and the mechanism and those of the message table.
 
 use glam::{Quat, Vec3};
 use heapless::Vec;
 use mortise_haptics::{FacePair, GuidanceState, Pose, Wrench};
+use mortise_mechanism::interface::{DriverFault, DriverFaultKind};
 use mortise_protocol::limits::MAX_PAIRS;
-use mortise_protocol::message::{Guidance, TouchingPair, WirePose, WireWrench};
+use mortise_protocol::message::{DriverReport, Guidance, TouchingPair, WirePose, WireWrench};
 
 /// A pose for the wire.
 pub fn pose_to_wire(pose: &Pose) -> WirePose {
@@ -42,6 +43,15 @@ pub fn guidance_to_wire(state: &GuidanceState) -> Guidance {
         joints: state.exclusions,
         engagement: state.engagement,
         wrench: wrench_to_wire(&state.wrench),
+    }
+}
+
+/// A motor driver's fault, for the wire.
+pub fn driver_to_wire(fault: DriverFault) -> DriverReport {
+    match fault.kind {
+        DriverFaultKind::Any => DriverReport::Any(fault.axis),
+        DriverFaultKind::OverCurrent => DriverReport::OverCurrent(fault.axis),
+        DriverFaultKind::OverTemperature => DriverReport::OverTemperature(fault.axis),
     }
 }
 

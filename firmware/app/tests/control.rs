@@ -31,7 +31,7 @@ fn armed() -> Bench {
 fn wrench(drive: Drive) -> Wrench {
     match drive {
         Drive::Wrench(wrench) => wrench,
-        Drive::Off => panic!("motors off"),
+        other => panic!("no wrench: {other:?}"),
     }
 }
 

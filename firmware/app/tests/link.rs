@@ -123,6 +123,7 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
         Refusal::RigDamaged,
         Refusal::Undecodable,
         Refusal::Outdated,
+        Refusal::NoSuchMotor { motors: 3 },
     ];
     for reason in reasons {
         let got = match reason {
@@ -239,6 +240,10 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
                 bench.count -= 1;
                 bench.request(&ToDevice::Arm)
             }
+            Refusal::NoSuchMotor { motors } => Bench::ready().request(&ToDevice::TestMotor {
+                joint: motors,
+                force: 1.0,
+            }),
             Refusal::Undecodable => {
                 let mut bench = Bench::ready();
                 // A valid frame without a message: variant 255.
@@ -551,7 +556,7 @@ proptest! {
 
     /// Any order of valid messages satisfies the rule: motors driven only in a live state.
     #[test]
-    fn any_order_of_messages_keeps_motors_and_state_together(choices in prop::collection::vec((0u8..16, 0u32..150), 1..40)) {
+    fn any_order_of_messages_keeps_motors_and_state_together(choices in prop::collection::vec((0u8..17, 0u32..150), 1..40)) {
         let mut bench = Bench::ready();
         for (choice, wait) in choices {
             let message = match choice {
@@ -568,12 +573,16 @@ proptest! {
                 12 => ToDevice::SetParameter { id: ParameterId::ForceLimit, value: 5.0 },
                 13 => ToDevice::SetTelemetry { every_ticks: 3 },
                 14 => ToDevice::Restart,
+                15 => ToDevice::TestMotor { joint: 1, force: -0.5 },
                 _ => ToDevice::Heartbeat,
             };
             bench.send(&message);
             for _ in 0..=wait {
                 bench.tick();
-                let live = matches!(bench.state(), DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop);
+                let live = matches!(
+                    bench.state(),
+                    DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop | DeviceState::Testing
+                );
                 prop_assert_eq!(bench.strings.last() != Drive::Off, live);
             }
         }

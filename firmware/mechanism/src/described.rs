@@ -16,6 +16,8 @@ pub struct DescribedMechanism {
     rendered: bool,
     /// Currents without the encoders' probes, A.
     driven: [f32; MAX_JOINTS],
+    /// Counts of the last reading.
+    counts: [i32; ENCODERS],
     referenced: bool,
 }
 
@@ -30,6 +32,7 @@ impl DescribedMechanism {
             watch: EncoderWatch::new(),
             rendered: false,
             driven: [0.0; MAX_JOINTS],
+            counts: [0; ENCODERS],
             referenced,
         })
     }
@@ -41,6 +44,7 @@ impl DescribedMechanism {
 
     /// Processes the counts of one tick: pose, velocity and encoder faults. The reference is lost with the first jump and in an impossible posture.
     pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Sensed {
+        self.counts = *counts;
         let reading = self.joints.read(counts);
         let encoder_stuck = if self.rendered {
             self.watch
@@ -67,6 +71,7 @@ impl DescribedMechanism {
         self.driven = match drive {
             Drive::Off => [0.0; MAX_JOINTS],
             Drive::Wrench(wrench) => self.joints.currents(wrench.force),
+            Drive::Joint { joint, force } => self.joints.joint_currents(usize::from(joint), force),
         };
         let mut currents = self.driven;
         if drive == Drive::Off || !self.rendered {
@@ -80,6 +85,21 @@ impl DescribedMechanism {
         currents
     }
 
+    /// Motors of the joints.
+    pub fn motors(&self) -> u8 {
+        self.joints.model().joints() as u8
+    }
+
+    /// Counts of the last reading.
+    pub fn counts(&self) -> [i32; ENCODERS] {
+        self.counts
+    }
+
+    /// Currents of the last drive command without the encoders' probes, A.
+    pub fn driven(&self) -> [f32; MAX_JOINTS] {
+        self.driven
+    }
+
     /// See [`crate::interface::Mechanism::watch_encoders`].
     pub fn watch_encoders(&mut self, rendered: bool) {
         self.rendered = rendered;
@@ -89,6 +109,7 @@ impl DescribedMechanism {
     pub fn reference(&mut self, counts: &[i32; ENCODERS]) {
         self.watch.rest();
         self.joints.start_at(counts);
+        self.counts = *counts;
         self.referenced = true;
     }
 

@@ -3,6 +3,7 @@
 //! A board implements [`Mechanism`] with its encoders, motors and stop input; a simulation with a model of them.
 
 use mortise_haptics::{Pose, Twist, Wrench};
+use mortise_protocol::limits::{MAX_ENCODERS, MAX_JOINTS};
 use mortise_protocol::message::{HandScript, InputFault};
 
 /// Ticks in a second.
@@ -75,6 +76,14 @@ pub enum Drive {
     Off,
     /// Enable output active, currents such that this wrench acts on the handle at its origin, world axes.
     Wrench(Wrench),
+    /// Enable output active, current in the motor of one joint alone: it pushes the joint forward, as the description says, with this force at the
+    /// handle, N. A mechanism without a description gives no current.
+    Joint {
+        /// Joint, from 0.
+        joint: u8,
+        /// Force at the handle, N.
+        force: f32,
+    },
 }
 
 /// Encoders, motors, stop input: read once and driven once in each tick, from the control plane only.
@@ -98,6 +107,21 @@ pub trait Mechanism {
     /// Upper bound of an encoder count at the handle: m and rad. Readings are within half of this; 0: unknown.
     fn count(&self) -> [f32; 2] {
         [0.0; 2]
+    }
+
+    /// Motors that [`Drive::Joint`] can drive; 0 without a description.
+    fn motors(&self) -> u8 {
+        0
+    }
+
+    /// Counts of the encoders in the last reading: of the joints, then of the wrist; 0 for an absent one.
+    fn counts(&self) -> [i32; MAX_ENCODERS] {
+        [0; MAX_ENCODERS]
+    }
+
+    /// Currents of the joints' motors under the last drive command, A.
+    fn currents(&self) -> [f32; MAX_JOINTS] {
+        [0.0; MAX_JOINTS]
     }
 
     /// Sets the reference: the handle is in its reference pose, and incremental encoders count from here. Called with the motors off only.

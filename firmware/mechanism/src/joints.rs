@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use mortise_haptics::{Pose, Twist};
-use mortise_protocol::limits::MAX_JOINTS;
+use mortise_protocol::limits::{MAX_ENCODERS, MAX_JOINTS};
 use mortise_protocol::rig::{Rig, RigFault};
 
 use crate::encoder::Counter;
@@ -12,7 +12,7 @@ use crate::kinematics::{Model, Posture};
 use crate::velocity::{Estimator, InUse};
 
 /// Encoders of a description: joints, then wrist axes. Counts of absent ones stay 0.
-pub const ENCODERS: usize = MAX_JOINTS + 3;
+pub const ENCODERS: usize = MAX_ENCODERS;
 /// Rate of a wrist axis above which a reading is treated as a jump, rad/s: above any speed limit that can be set.
 const WRIST_RATE: f32 = 200.0;
 /// Stiffest hand in which a probe moves the handle, N/m: a tensed arm. Less than that of a free handle ([`crate::encoder_watch::STIFFEST_HAND`]),
@@ -222,6 +222,21 @@ impl Joints {
             currents[joint] = wanted;
         }
         currents.map(|wanted| wanted * scale)
+    }
+
+    /// Currents (A, signed in the motor's sense) that push one joint alone with `force` (N, positive: forward) at the handle along its own path: with
+    /// the others free, the torque is force·|J_j|. At most the motor's limit; none for an absent joint or a force that is not a number.
+    pub fn joint_currents(&self, joint: usize, force: f32) -> [f32; MAX_JOINTS] {
+        let mut currents = [0.0; MAX_JOINTS];
+        if joint < self.model.joints() {
+            let torque = force * self.posture.jacobian.col(joint).length();
+            let wanted = torque / self.torque_per_ampere[joint];
+            if wanted.is_finite() {
+                let limit = self.current_limit[joint];
+                currents[joint] = wanted.clamp(-limit, limit);
+            }
+        }
+        currents
     }
 
     /// Joint torques of these currents, N·m.

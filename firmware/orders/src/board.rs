@@ -243,6 +243,10 @@ impl Mechanism for Puppet<'_> {
         self.0.driven.set(drive != Drive::Off);
     }
 
+    fn motors(&self) -> u8 {
+        1
+    }
+
     fn home(&mut self) {
         self.0.sense(|sensed| sensed.referenced = true);
     }

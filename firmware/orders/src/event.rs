@@ -30,10 +30,12 @@ pub enum Order {
     Commit,
     /// Restart the board.
     Restart,
+    /// Test a motor.
+    Test,
 }
 
 /// Number of orders, as [`Order`] numbers them.
-pub(crate) const ORDERS: usize = 8;
+pub(crate) const ORDERS: usize = 9;
 
 /// One step of the environment of the two planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -86,7 +88,7 @@ impl Event {
     }
 }
 
-/// Every event, except that a restart is ordered: that adds more than half as many states again, and has a topic.
+/// Every event, except that a restart or a test is ordered: either adds more than half as many states again, and has a topic.
 pub const ALPHABET: [Event; 32] = [
     Event::Hello(Host::A),
     Event::Hello(Host::B),
@@ -132,7 +134,7 @@ pub struct Topic {
 }
 
 /// The topics, each with so few events that sequences of ten can be enumerated.
-pub const TOPICS: [Topic; 6] = [
+pub const TOPICS: [Topic; 7] = [
     Topic {
         name: "checksum",
         events: &[
@@ -187,6 +189,18 @@ pub const TOPICS: [Topic; 6] = [
             Event::Deliver(Order::Grab),
             Event::Disarm,
             Event::Release,
+            Event::Tick,
+            Event::Wait,
+        ],
+    },
+    Topic {
+        name: "test",
+        events: &[
+            Event::Hello(Host::B),
+            Event::Send(Host::A, Order::Arm),
+            Event::Send(Host::A, Order::Test),
+            Event::Deliver(Order::Test),
+            Event::Disarm,
             Event::Tick,
             Event::Wait,
         ],

@@ -21,7 +21,7 @@ pub enum Broken {
     StateDiffers,
     /// Motors driven, other than to fade out, after a `Disarm` or a greeting that no fresh order to arm followed.
     AfterDisarm,
-    /// Motors live longer than a soft stop may take.
+    /// Motors live longer than a soft stop or a test may take.
     FadeLate,
     /// A part rendered after a `Release`, or through an order to grab that was late, repeated, or of another session.
     NotGrabbed,
@@ -79,6 +79,8 @@ pub(crate) struct Seen {
     pub held: bool,
     /// A part is rendered.
     pub active: bool,
+    /// A motor is tested.
+    pub tested: bool,
     /// Stopped or in a fault.
     pub halted: bool,
     /// The encoders have a reference.
@@ -96,6 +98,8 @@ pub(crate) struct Oracle {
     fresh: bool,
     /// For one of them the scene in use was intact.
     sound: bool,
+    /// A fresh order to test a motor arrived since the last tick.
+    test: bool,
     /// A STOP arrived since the last tick.
     stopping: bool,
     /// Orders to arm, against `Disarm`, STOP and greetings.
@@ -114,12 +118,13 @@ impl Oracle {
     pub fn stop(&mut self) {
         self.must_clear = true;
         self.stopping = true;
-        (self.fresh, self.sound) = (false, false);
+        (self.fresh, self.sound, self.test) = (false, false, false);
         self.disarm();
     }
 
     pub fn greeted(&mut self) {
         (self.fresh, self.sound, self.restart) = (false, false, false);
+        self.test = false;
         self.disarm();
     }
 
@@ -137,6 +142,14 @@ impl Oracle {
         if !self.live {
             self.fresh = true;
             self.sound |= sound;
+            self.arming = Course::Begins;
+        }
+    }
+
+    /// A fresh order to test a motor, refused while motors are live. It needs no scene.
+    pub fn test(&mut self) {
+        if !self.live {
+            self.test = true;
             self.arming = Course::Begins;
         }
     }
@@ -167,16 +180,17 @@ impl Oracle {
     pub fn tick(&mut self, seen: &Seen) -> Option<Broken> {
         let began = seen.live && !self.live;
         // If fresh orders cleared and armed after the STOP, the motors were off in between.
-        let anew = began && self.fresh && !self.must_clear;
+        let fresh = if seen.tested { self.test } else { self.fresh };
+        let anew = began && fresh && !self.must_clear;
         let broken = if seen.live && self.stopping && !anew {
             Some(Broken::StopLate)
         } else if seen.live && !seen.referenced {
             Some(Broken::NoReference)
         } else if began && self.must_clear {
             Some(Broken::AfterStop)
-        } else if began && !self.fresh {
+        } else if began && !fresh {
             Some(Broken::NotFresh)
-        } else if began && (!self.sound || seen.other_scene) {
+        } else if began && !seen.tested && (!self.sound || seen.other_scene) {
             Some(Broken::NoChecksum)
         } else if seen.held && !self.arming.allows(self.held) {
             Some(Broken::AfterDisarm)

@@ -19,9 +19,9 @@ use crate::planes::{Planes, Saved};
 /// The parameter that is set and read; its values, m: the default, and another. The rig is at the origin, within both.
 const PARAMETER: ParameterId = ParameterId::WorkspaceRadius;
 const VALUES: [f32; 2] = [1.0, 0.3];
-/// Ticks of [`Event::Wait`]: a soft stop takes 100.
+/// Ticks of [`Event::Wait`]: a soft stop and the test of a motor take 100 each.
 const WAIT_TICKS: u32 = 120;
-/// Ticks of a soft stop, a little fewer than it takes.
+/// Ticks of a soft stop or a test, a little fewer than it takes.
 const FADE_TICKS: u32 = 99;
 /// Largest number of reports to the host that one event can cause, now or by the commands it queues (checked in every step).
 const REPORTS_AN_EVENT: usize = 4;
@@ -317,6 +317,7 @@ impl<'i> World<'i> {
                 Order::Clear => self.outside.oracle.clear(),
                 Order::Grab => self.outside.oracle.grab(),
                 Order::Restart => self.outside.oracle.restart(),
+                Order::Test => self.outside.oracle.test(),
                 Order::Home | Order::Set | Order::Upload | Order::Commit => {}
             }
             self.outside.newest = sent.stamp.count;
@@ -338,6 +339,7 @@ impl<'i> World<'i> {
             },
             Order::Commit => ToDevice::SceneCommit,
             Order::Restart => ToDevice::Restart,
+            Order::Test => ToDevice::TestMotor { joint: 0, force: 1.0 },
         };
         self.receive(Some(sent.stamp), &message);
         if order == Order::Upload {
@@ -364,7 +366,10 @@ impl<'i> World<'i> {
     /// Runs more ticks than a soft stop takes.
     fn wait(&mut self) -> Option<Broken> {
         let mut broken = self.tick();
-        let fades = self.planes.control.safety().motors() == Motors::Fading;
+        let fades = matches!(
+            self.planes.control.safety().motors(),
+            Motors::Fading | Motors::Tested
+        );
         for _ in 1..WAIT_TICKS {
             broken = broken.or(self.tick());
         }
@@ -399,6 +404,7 @@ impl<'i> World<'i> {
             live,
             held: live && state.motors() != Motors::Fading,
             active: state == Safety::Active,
+            tested: state == Safety::Testing,
             halted,
             referenced: rig.sensed.get().referenced,
             other_scene: self.slot_in_use() != slot,

@@ -50,6 +50,17 @@ pub struct Described {
     hand_wrench: Wrench,
     /// Motor currents, with the encoders' probes.
     currents: [f32; MAX_JOINTS],
+    /// The wiring in this tick, scripted faults included.
+    wired: Wiring,
+    /// Senses of encoders and motors in the description.
+    described: Senses,
+}
+
+/// Whether encoders and motors are described as reversed; wrist axes have their sense in their counts.
+#[derive(Clone, Copy, Debug)]
+struct Senses {
+    encoders: [bool; ENCODERS],
+    motors: [bool; MAX_JOINTS],
 }
 
 /// True state of the mechanism.
@@ -84,9 +95,15 @@ impl Described {
         };
         let mut range = [[0.0; 2]; MAX_JOINTS];
         let mut start = [0.0; ENCODERS];
+        let mut described = Senses {
+            encoders: [false; ENCODERS],
+            motors: [false; MAX_JOINTS],
+        };
         for (number, joint) in rig.joints.iter().enumerate() {
             range[number] = joint.range;
             start[number] = joint.home;
+            described.encoders[number] = joint.encoder_reversed;
+            described.motors[number] = joint.motor_reversed;
         }
         let wrist = rig.wrist.map_or([0.0; 3], |wrist| wrist.home);
         start[MAX_JOINTS..].copy_from_slice(&wrist);
@@ -113,6 +130,8 @@ impl Described {
             hand: None,
             hand_wrench: Wrench::ZERO,
             currents: [0.0; MAX_JOINTS],
+            wired: Wiring::SOUND,
+            described,
         })
     }
 
@@ -137,11 +156,21 @@ impl Described {
             // As many encoders as the free handle has axes.
             self.offsets[encoder] = self.offsets[encoder].saturating_add(wiring.glitch[encoder]);
             if !wiring.stuck[encoder] {
-                let angle = self.links.angle(encoder);
-                self.counts[encoder] = (self.mechanism.joints())
-                    .count(encoder, angle)
+                self.counts[encoder] = self
+                    .true_count(encoder, wiring)
                     .saturating_add(self.offsets[encoder]);
             }
+        }
+    }
+
+    /// Count at an input, from the true angle of the joint whose encoder is wired to it.
+    fn true_count(&self, encoder: usize, wiring: &Wiring) -> i32 {
+        let source = usize::from(wiring.encoders[encoder]);
+        let count = self.mechanism.joints().count(source, self.links.angle(source));
+        let described = self.described.encoders[source];
+        match wiring.encoders_reversed[source] {
+            Some(reversed) if reversed != described => count.saturating_neg(),
+            _ => count,
         }
     }
 }
@@ -284,6 +313,7 @@ impl Mechanism for Described {
     fn sense(&mut self) -> Sensed {
         let wiring = self.script.advance(self.wiring);
         self.wiring.glitch = [0; AXES];
+        self.wired = wiring;
         self.count(&wiring);
         wiring.through(self.mechanism.read(&self.counts))
     }
@@ -300,11 +330,23 @@ impl Mechanism for Described {
         self.mechanism.joints().count_at_handle()
     }
 
+    fn motors(&self) -> u8 {
+        self.mechanism.motors()
+    }
+
+    fn counts(&self) -> [i32; ENCODERS] {
+        self.counts
+    }
+
+    fn currents(&self) -> [f32; MAX_JOINTS] {
+        self.mechanism.driven()
+    }
+
     /// The operator model knows the joints' exact positions.
     fn home(&mut self) {
         self.offsets = [0; ENCODERS];
         for encoder in 0..ENCODERS {
-            self.counts[encoder] = self.mechanism.joints().count(encoder, self.links.angle(encoder));
+            self.counts[encoder] = self.true_count(encoder, &self.wired);
         }
         self.mechanism.reference(&self.counts);
     }
@@ -318,7 +360,15 @@ impl Simulation for Described {
     fn advance(&mut self) {
         let held = self.hand.as_mut().map(|hand| (hand.impedance, hand.advance()));
         let joints = self.mechanism.joints();
-        let motors = joints.torques(&self.currents);
+        let given = core::array::from_fn(|joint| {
+            let described = self.described.motors[joint];
+            match self.wired.motors_reversed[joint] {
+                _ if self.wired.motors_dead[joint] => 0.0,
+                Some(reversed) if reversed != described => -self.currents[joint],
+                _ => self.currents[joint],
+            }
+        });
+        let motors = joints.torques(&given);
         let mut sum = Wrench::ZERO;
         for _ in 0..SUBSTEPS {
             let hand = self.links.step(motors, held.as_ref(), joints);
@@ -357,6 +407,7 @@ impl Simulation for Described {
         self.hand = None;
         self.hand_wrench = Wrench::ZERO;
         self.currents = [0.0; MAX_JOINTS];
+        self.wired = Wiring::SOUND;
         Some(self.links.pose())
     }
 }

@@ -5,11 +5,11 @@
 use heapless::Vec;
 pub use mortise_firmware::scripts::AXES;
 use mortise_mechanism::interface::{DriverFault, DriverFaultKind, Sensed};
-use mortise_protocol::limits::MAX_INPUT_FAULTS;
+use mortise_protocol::limits::{MAX_INPUT_FAULTS, MAX_JOINTS};
 use mortise_protocol::message::{InputFault, InputFaultKind};
 
 /// State of the simulated wiring in one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wiring {
     /// The stop input is open.
     pub stop_open: bool,
@@ -23,6 +23,14 @@ pub struct Wiring {
     pub stuck: [bool; AXES],
     /// The position reads as not a number.
     pub not_a_number: bool,
+    /// Encoder that is wired to each input.
+    pub encoders: [u8; AXES],
+    /// Whether each encoder counts down when its axis turns forward; `None`: as described.
+    pub encoders_reversed: [Option<bool>; AXES],
+    /// Whether each joint's motor pushes backward under a positive current; `None`: as described.
+    pub motors_reversed: [Option<bool>; MAX_JOINTS],
+    /// Joints whose motors give no torque.
+    pub motors_dead: [bool; MAX_JOINTS],
 }
 
 impl Wiring {
@@ -34,6 +42,10 @@ impl Wiring {
         glitch: [0; AXES],
         stuck: [false; AXES],
         not_a_number: false,
+        encoders: [0, 1, 2, 3, 4, 5],
+        encoders_reversed: [None; AXES],
+        motors_reversed: [None; MAX_JOINTS],
+        motors_dead: [false; MAX_JOINTS],
     };
 
     /// The readings that result when the true readings `sensed` pass through this wiring.
@@ -72,6 +84,27 @@ impl Wiring {
             }
             InputFaultKind::StopOpen => self.stop_open = true,
             InputFaultKind::SupplyLow => self.supply_low = true,
+            InputFaultKind::EncoderSense { axis, reversed } => {
+                if let Some(sense) = self.encoders_reversed.get_mut(usize::from(axis)) {
+                    *sense = Some(reversed);
+                }
+            }
+            InputFaultKind::MotorSense { axis, reversed } => {
+                if let Some(sense) = self.motors_reversed.get_mut(usize::from(axis)) {
+                    *sense = Some(reversed);
+                }
+            }
+            InputFaultKind::MotorDead { axis } => {
+                if let Some(dead) = self.motors_dead.get_mut(usize::from(axis)) {
+                    *dead = true;
+                }
+            }
+            InputFaultKind::EncodersSwapped { axis, with } => {
+                let (one, other) = (usize::from(axis), usize::from(with));
+                if one < AXES && other < AXES {
+                    self.encoders.swap(one, other);
+                }
+            }
         }
     }
 }

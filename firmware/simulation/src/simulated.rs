@@ -332,7 +332,8 @@ impl Mechanism for Simulated {
     fn drive(&mut self, drive: Drive) {
         let (force, torque) = (Vec3::splat(MOTOR_FORCE), Vec3::splat(MOTOR_TORQUE));
         self.driven = match drive {
-            Drive::Off => Wrench::ZERO,
+            // It has axes in place of joints.
+            Drive::Off | Drive::Joint { .. } => Wrench::ZERO,
             Drive::Wrench(w) => Wrench {
                 force: w.force.clamp(-force, force),
                 torque: w.torque.clamp(-torque, torque),

@@ -1,5 +1,6 @@
 //! The mechanism of a simulated board: the one described in its flash, or a free handle with six motors.
 
+use mortise_protocol::limits::{MAX_ENCODERS, MAX_JOINTS};
 use mortise_protocol::rig::Rig;
 
 use crate::described::Described;
@@ -55,6 +56,18 @@ impl Mechanism for SimulatedRig {
 
     fn count(&self) -> [f32; 2] {
         each!(self, mechanism => mechanism.count())
+    }
+
+    fn motors(&self) -> u8 {
+        each!(self, mechanism => Mechanism::motors(mechanism))
+    }
+
+    fn counts(&self) -> [i32; MAX_ENCODERS] {
+        each!(self, mechanism => mechanism.counts())
+    }
+
+    fn currents(&self) -> [f32; MAX_JOINTS] {
+        each!(self, mechanism => Mechanism::currents(mechanism))
     }
 
     fn home(&mut self) {

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use mortise_protocol::message::{Capabilities, DeviceState, FromDevice, Statistics, ToDevice, Version};
+use mortise_protocol::message::{
+    Capabilities, DeviceState, FromDevice, MotorTest, Readings, Statistics, ToDevice, Version,
+};
 use mortise_protocol::parameter::ParameterId;
 use mortise_protocol::rig::Rig;
 
@@ -232,6 +234,8 @@ impl Client {
             | ToDevice::GetParameter(_)
             | ToDevice::GetStatistics { .. }
             | ToDevice::GetRig
+            | ToDevice::GetReadings
+            | ToDevice::TestMotor { .. }
             | ToDevice::Run { .. } => self.ask(&message).map(|_| ()),
             ToDevice::Lockstep(on) => {
                 let on = *on;
@@ -275,6 +279,29 @@ impl Client {
         match *self.ask(&ToDevice::GetRig)? {
             FromDevice::Rig { rig, in_use } => Ok((rig, in_use)),
             _ => Err(self.no_answer(&ToDevice::GetRig, self.patience.answer)),
+        }
+    }
+
+    /// Readings of encoders and safety inputs.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn readings(&self) -> Result<Readings, RigError> {
+        match *self.ask(&ToDevice::GetReadings)? {
+            FromDevice::Readings(readings) => Ok(readings),
+            _ => Err(self.no_answer(&ToDevice::GetReadings, self.patience.answer)),
+        }
+    }
+
+    /// Pushes with the motor of one joint for a moment (see [`ToDevice::TestMotor`]); returns when the motors are off again.
+    ///
+    /// # Errors
+    /// As [`Client::request`]; `Refused(State)` with the state that ended the test.
+    pub fn test_motor(&self, joint: u8, force: f32) -> Result<MotorTest, RigError> {
+        let message = ToDevice::TestMotor { joint, force };
+        match *self.ask(&message)? {
+            FromDevice::MotorTested(test) => Ok(test),
+            _ => Err(self.no_answer(&message, self.patience.answer)),
         }
     }
 
@@ -337,17 +364,26 @@ impl Client {
     /// # Errors
     /// As [`Client::request`] and [`Client::connect`].
     pub fn restart(mut self) -> Result<Self, RigError> {
+        self.capabilities = self.restart_board()?;
+        Ok(self)
+    }
+
+    /// As [`Self::restart`], for a client that others use too; [`Self::capabilities`] stay those of the start before, and the new ones are returned.
+    ///
+    /// # Errors
+    /// As [`Self::restart`].
+    pub fn restart_board(&self) -> Result<Capabilities, RigError> {
         // Heartbeats sent meanwhile are refused, which is expected.
         self.link.forget_greeting();
         self.request(ToDevice::Restart)?;
         let lockstep = self.lockstep.swap(false, Ordering::Relaxed);
         self.link.forgive_silence();
-        self.capabilities = greet(&self.link, &self.name, &self.patience)?;
-        self.link.set_state(self.capabilities.state);
+        let capabilities = greet(&self.link, &self.name, &self.patience)?;
+        self.link.set_state(capabilities.state);
         if lockstep {
             self.set_lockstep(true)?;
         }
-        Ok(self)
+        Ok(capabilities)
     }
 
     pub(crate) fn link(&self) -> &Link {

@@ -76,6 +76,7 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::ClearTarget { .. }
         | ToDevice::SetTelemetry { .. }
         | ToDevice::RecordInputs(_)
+        | ToDevice::GetReadings
         | ToDevice::GetStatistics { reset: false }
         | ToDevice::Lockstep(_) => true,
         ToDevice::Arm
@@ -88,7 +89,8 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::SimulatedHand(_)
         | ToDevice::SimulatedInputs(_)
         | ToDevice::Run { .. }
-        | ToDevice::Restart => false,
+        | ToDevice::Restart
+        | ToDevice::TestMotor { .. } => false,
     }
 }
 
@@ -96,7 +98,11 @@ fn repeatable(message: &ToDevice) -> bool {
 fn rearms(message: &ToDevice) -> bool {
     matches!(
         message,
-        ToDevice::Arm | ToDevice::ClearFault | ToDevice::Home | ToDevice::Grab { .. }
+        ToDevice::Arm
+            | ToDevice::ClearFault
+            | ToDevice::Home
+            | ToDevice::Grab { .. }
+            | ToDevice::TestMotor { .. }
     )
 }
 

@@ -23,6 +23,7 @@
 //! [`Event`]s. Another thread keeps the link alive and detects its loss. The protocol is in `docs/protocol.md`.
 
 mod client;
+pub mod commissioning;
 mod description;
 mod emulator;
 mod error;

@@ -28,6 +28,8 @@ pub(crate) enum Expect {
     Statistics,
     Ran,
     Rig,
+    Readings,
+    MotorTested,
 }
 
 impl Expect {
@@ -39,6 +41,8 @@ impl Expect {
             ToDevice::GetStatistics { .. } => Self::Statistics,
             ToDevice::Run { .. } => Self::Ran,
             ToDevice::GetRig => Self::Rig,
+            ToDevice::GetReadings => Self::Readings,
+            ToDevice::TestMotor { .. } => Self::MotorTested,
             _ => Self::Ack,
         }
     }
@@ -49,7 +53,9 @@ impl Expect {
             | (Self::Capabilities, FromDevice::Capabilities(_))
             | (Self::Statistics, FromDevice::Statistics(_))
             | (Self::Ran, FromDevice::Ran { .. })
-            | (Self::Rig, FromDevice::Rig { .. }) => true,
+            | (Self::Rig, FromDevice::Rig { .. })
+            | (Self::Readings, FromDevice::Readings(_))
+            | (Self::MotorTested, FromDevice::MotorTested(_)) => true,
             (Self::Parameter(wanted), FromDevice::Parameter { id, .. }) => wanted == *id,
             _ => false,
         }

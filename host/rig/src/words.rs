@@ -37,6 +37,7 @@ impl Words for DeviceState {
             Self::SoftStop => "stopping softly".into(),
             Self::Stopped => "stopped, motors off until cleared".into(),
             Self::Fault(fault) => format!("fault: {}", fault.words()),
+            Self::Testing => "testing a motor".into(),
         }
     }
 }
@@ -142,6 +143,8 @@ impl Words for Refusal {
             Self::Outdated => {
                 "the command came late, twice, or from before the board's last stop, fault or greeting, and was not executed: check the rig, then repeat the command; if this recurs, connect again".into()
             }
+            Self::NoSuchMotor { motors: 0 } => "without a description of its rig the board cannot test single motors: send one (`mortise rig send`)".into(),
+            Self::NoSuchMotor { motors } => format!("the mechanism has no such joint, only 1 to {motors}"),
             Self::Undecodable => "the board did not understand the message: flash the firmware of this release".into(),
         }
     }
@@ -152,7 +155,7 @@ fn hint(state: &DeviceState) -> &'static str {
         DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop => " (disarm first)",
         DeviceState::Stopped => " (clear the stop first)",
         DeviceState::Idle => " (arm first)",
-        DeviceState::Boot => " (wait a moment)",
+        DeviceState::Boot | DeviceState::Testing => " (wait a moment)",
         DeviceState::Homing => "",
         DeviceState::Fault(_) => "",
     }
@@ -194,6 +197,8 @@ impl Words for ToDevice {
             Self::GetRig => "reading the description of the rig".into(),
             Self::RecordInputs(true) => "recording the inputs of every tick".into(),
             Self::RecordInputs(false) => "ending the recording of inputs".into(),
+            Self::GetReadings => "reading encoders and inputs".into(),
+            Self::TestMotor { joint, .. } => format!("testing the motor of joint {}", joint + 1),
         }
     }
 }
@@ -285,6 +290,8 @@ mod tests {
             Refusal::RigDamaged,
             Refusal::Undecodable,
             Refusal::Outdated,
+            Refusal::NoSuchMotor { motors: 0 },
+            Refusal::NoSuchMotor { motors: 3 },
         ] {
             is_a_sentence(&describe(refusal));
         }

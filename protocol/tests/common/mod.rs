@@ -92,7 +92,7 @@ impl Random {
     }
 
     fn state(&mut self) -> DeviceState {
-        match self.below(8) {
+        match self.below(9) {
             0 => DeviceState::Boot,
             1 => DeviceState::Homing,
             2 => DeviceState::Idle,
@@ -100,6 +100,7 @@ impl Random {
             4 => DeviceState::Active,
             5 => DeviceState::SoftStop,
             6 => DeviceState::Stopped,
+            7 => DeviceState::Testing,
             _ => DeviceState::Fault(self.fault()),
         }
     }
@@ -159,6 +160,7 @@ impl Random {
             19 => Refusal::RigFixed,
             20 => Refusal::RigDamaged,
             21 => Refusal::Outdated,
+            22 => Refusal::NoSuchMotor { motors: self.u8() },
             _ => Refusal::Undecodable,
         }
     }
@@ -295,7 +297,7 @@ impl Random {
         InputFault {
             tick: self.u32(),
             ticks: self.u32(),
-            kind: match self.below(8) {
+            kind: match self.below(12) {
                 0 => InputFaultKind::EncoderGlitch {
                     axis,
                     counts: self.u32() as i32,
@@ -306,7 +308,20 @@ impl Random {
                 4 => InputFaultKind::OverCurrent { axis },
                 5 => InputFaultKind::OverTemperature { axis },
                 6 => InputFaultKind::StopOpen,
-                _ => InputFaultKind::SupplyLow,
+                7 => InputFaultKind::SupplyLow,
+                8 => InputFaultKind::EncoderSense {
+                    axis,
+                    reversed: self.bool(),
+                },
+                9 => InputFaultKind::MotorSense {
+                    axis,
+                    reversed: self.bool(),
+                },
+                10 => InputFaultKind::MotorDead { axis },
+                _ => InputFaultKind::EncodersSwapped {
+                    axis,
+                    with: self.u8(),
+                },
             },
         }
     }
@@ -325,6 +340,19 @@ impl Random {
         }
     }
 
+    fn driver(&mut self) -> Option<DriverReport> {
+        match self.below(4) {
+            0 => None,
+            1 => Some(DriverReport::Any(self.u8())),
+            2 => Some(DriverReport::OverCurrent(self.u8())),
+            _ => Some(DriverReport::OverTemperature(self.u8())),
+        }
+    }
+
+    fn counts(&mut self) -> [i32; MAX_ENCODERS] {
+        std::array::from_fn(|_| self.u32() as i32)
+    }
+
     fn tick_input(&mut self) -> TickInput {
         let twist = self.wrench();
         TickInput {
@@ -338,12 +366,7 @@ impl Random {
             supply_low: self.bool(),
             impossible_posture: self.bool(),
             referenced: self.bool(),
-            driver: match self.below(4) {
-                0 => None,
-                1 => Some(DriverReport::Any(self.u8())),
-                2 => Some(DriverReport::OverCurrent(self.u8())),
-                _ => Some(DriverReport::OverTemperature(self.u8())),
-            },
+            driver: self.driver(),
             encoder_jump: self.bool().then(|| self.u8()),
             encoder_stuck: self.bool().then(|| self.u8()),
             carried_out: self.u16(),
@@ -426,7 +449,7 @@ impl Random {
 }
 
 /// Kinds of host message; a test compares it with the schema.
-pub const TO_DEVICE: usize = 29;
+pub const TO_DEVICE: usize = 31;
 
 /// A random host message of kind `kind < TO_DEVICE`.
 pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
@@ -469,12 +492,17 @@ pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
         25 => ToDevice::Restart,
         26 => ToDevice::SetRig(r.rig()),
         27 => ToDevice::GetRig,
-        _ => ToDevice::RecordInputs(r.bool()),
+        28 => ToDevice::RecordInputs(r.bool()),
+        29 => ToDevice::GetReadings,
+        _ => ToDevice::TestMotor {
+            joint: r.u8(),
+            force: r.f32(),
+        },
     }
 }
 
 /// Kinds of board message; a test compares it with the schema.
-pub const FROM_DEVICE: usize = 13;
+pub const FROM_DEVICE: usize = 15;
 
 /// A random board message of kind `kind < FROM_DEVICE`.
 pub fn from_device(kind: usize, r: &mut Random) -> FromDevice {
@@ -509,11 +537,24 @@ pub fn from_device(kind: usize, r: &mut Random) -> FromDevice {
             rig: r.bool().then(|| r.rig()),
             in_use: r.bool(),
         },
-        _ => FromDevice::Inputs(Inputs {
+        12 => FromDevice::Inputs(Inputs {
             first_tick: r.u32(),
             count: [r.f32(), r.f32()],
             lost: r.u32(),
             ticks: r.list(Random::tick_input),
+        }),
+        13 => FromDevice::Readings(Readings {
+            tick: r.u32(),
+            counts: r.counts(),
+            currents: r.floats(),
+            referenced: r.bool(),
+            stop_open: r.bool(),
+            supply_low: r.bool(),
+            driver: r.driver(),
+        }),
+        _ => FromDevice::MotorTested(MotorTest {
+            moved: r.counts(),
+            far: r.bool(),
         }),
     }
 }

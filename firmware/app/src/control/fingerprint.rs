@@ -42,7 +42,7 @@ impl Possible {
 /// Counters of ticks that decide when a state ends by itself. A counter that decides nothing in the present state is 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timers {
-    /// Ticks since the soft stop began.
+    /// Ticks since the soft stop or the test of a motor began.
     pub fade: u32,
     /// Ticks since the one in which a frame from the host was noticed, that one included.
     pub silent: u32,
@@ -105,6 +105,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             },
             CommandKind::ClearFault => SafetyEvent::Clear { cause_gone: true },
             CommandKind::Grab(_) => SafetyEvent::Grab,
+            CommandKind::TestMotor { .. } => SafetyEvent::Test { referenced: true },
             CommandKind::Disarm => SafetyEvent::Disarm,
             CommandKind::Release => SafetyEvent::Release,
             CommandKind::SceneDamaged => SafetyEvent::Fault(Fault::SceneDamaged),
@@ -124,7 +125,9 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         match &command.kind {
             CommandKind::Arm(number) => (current, number.wrapping_sub(self.scene_number)).hash(hasher),
             CommandKind::Grab(part) => (current, part).hash(hasher),
-            CommandKind::ClearFault | CommandKind::Home => current.hash(hasher),
+            CommandKind::ClearFault | CommandKind::Home | CommandKind::TestMotor { .. } => {
+                current.hash(hasher)
+            }
             CommandKind::Disarm | CommandKind::Release | CommandKind::Restart => in_session.hash(hasher),
             CommandKind::Settings(settings) => settings.parameters.fingerprint(hasher),
             CommandKind::Parameter(id) => (in_session, id).hash(hasher),
@@ -140,7 +143,11 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         let fading = self.safety.motors() == Motors::Fading;
         let heard = self.late.heard != self.ends.shared.heard();
         Timers {
-            fade: if fading { self.rendered.fade.0.into() } else { 0 },
+            fade: if fading {
+                self.rendered.fade.0.into()
+            } else {
+                self.testing.ticks().into()
+            },
             silent: if fading || !self.safety.live() || heard {
                 0
             } else {

@@ -1,8 +1,10 @@
 //! Parts of the control plane's state.
 
-use mortise_haptics::{Output, Wrench};
-use mortise_protocol::message::{Fault, Statistics};
+use mortise_haptics::{Output, Vec3, Wrench};
+use mortise_protocol::limits::MAX_ENCODERS;
+use mortise_protocol::message::{DeviceState, Fault, Refusal, Statistics};
 
+use crate::channel::Reply;
 use crate::safety::Safety;
 use crate::statistics::StateHash;
 
@@ -30,6 +32,45 @@ pub(super) struct Recording {
     pub carried_out: u16,
     /// Ticks lost since it was switched on.
     pub lost: u32,
+}
+
+/// The test of a motor under way, and the answer that waits for space.
+#[derive(Default)]
+pub(super) struct Testing {
+    pub test: Option<Test>,
+    pub answer: Option<(Origin, Reply)>,
+}
+
+/// Sequence number of the message that began the test of a motor, and its session.
+pub(super) type Origin = (u16, u32);
+
+/// The test of a motor.
+pub(super) struct Test {
+    pub origin: Origin,
+    pub joint: u8,
+    pub force: f32,
+    /// Ticks so far, and those of the push once it has ended.
+    pub ticks: u16,
+    pub pushed: Option<u16>,
+    pub far: bool,
+    /// Counts each encoder moved during the push.
+    pub moved: [i32; MAX_ENCODERS],
+    /// Handle and counts at the start.
+    pub start: (Vec3, [i32; MAX_ENCODERS]),
+}
+
+impl Testing {
+    /// Ticks of the test under way; 0 without one.
+    pub fn ticks(&self) -> u16 {
+        self.test.as_ref().map_or(0, |test| test.ticks)
+    }
+
+    /// Ends a test that something else ended: the state that follows is the answer.
+    pub fn interrupt(&mut self, state: DeviceState) {
+        if let Some(test) = self.test.take() {
+            self.answer = Some((test.origin, Reply::Refused(Refusal::State(state))));
+        }
+    }
 }
 
 /// What came late: ticks, and the host.

@@ -1,12 +1,12 @@
 //! Inputs of every tick, for a recording that can be computed again to the bit.
 
 use mortise_haptics::Twist;
-use mortise_protocol::message::{DriverReport, Refusal, TickInput, WireTwist};
+use mortise_protocol::message::{Refusal, TickInput, WireTwist};
 
 use super::ControlPlane;
-use crate::board::{Clock, DriverFault, DriverFaultKind, Mechanism};
+use crate::board::{Clock, Mechanism};
 use crate::channel::Recorded;
-use crate::wire::pose_to_wire;
+use crate::wire::{driver_to_wire, pose_to_wire};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     pub(super) fn set_recording(&mut self, on: bool) -> Result<(), Refusal> {
@@ -55,13 +55,5 @@ fn twist_to_wire(twist: &Twist) -> WireTwist {
     WireTwist {
         linear: twist.linear.to_array(),
         angular: twist.angular.to_array(),
-    }
-}
-
-fn driver_to_wire(fault: DriverFault) -> DriverReport {
-    match fault.kind {
-        DriverFaultKind::Any => DriverReport::Any(fault.axis),
-        DriverFaultKind::OverCurrent => DriverReport::OverCurrent(fault.axis),
-        DriverFaultKind::OverTemperature => DriverReport::OverTemperature(fault.axis),
     }
 }

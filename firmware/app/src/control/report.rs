@@ -35,6 +35,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
                 state: self.safety.reported(),
             });
         }
+        self.answer_test();
     }
 
     pub(super) fn reply(&mut self, seq: u16, session: u32, reply: Reply) {

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
+use mortise_protocol::limits::MAX_ENCODERS;
 
 /// Shared between the test and the mechanism.
 #[derive(Clone)]
@@ -15,6 +16,8 @@ pub struct Pulled {
     pub drives: Vec<Drive>,
     /// Number of calls of `home`.
     pub homed: u32,
+    /// Counts of the encoders.
+    pub counts: [i32; MAX_ENCODERS],
 }
 
 impl Default for Strings {
@@ -22,6 +25,7 @@ impl Default for Strings {
         Self(Rc::new(RefCell::new(Pulled {
             sensed: Sensed::AT_REST,
             homed: 0,
+            counts: [0; MAX_ENCODERS],
             drives: Vec::new(),
         })))
     }
@@ -56,6 +60,14 @@ impl<const SIMULATED: bool, const DESCRIBED: bool> Mechanism for Puppet<SIMULATE
         let mut pulled = self.0.0.borrow_mut();
         pulled.homed += 1;
         pulled.sensed.referenced = true;
+    }
+
+    fn motors(&self) -> u8 {
+        3
+    }
+
+    fn counts(&self) -> [i32; MAX_ENCODERS] {
+        self.0.0.borrow().counts
     }
 
     fn drive(&mut self, drive: Drive) {

@@ -108,6 +108,22 @@ impl<H: Hardware> Mechanism for Device<H> {
             .map_or([0.0; 2], |mechanism| mechanism.joints().count_at_handle())
     }
 
+    fn motors(&self) -> u8 {
+        self.mechanism.as_ref().map_or(0, DescribedMechanism::motors)
+    }
+
+    fn counts(&self) -> [i32; ENCODERS] {
+        self.mechanism
+            .as_ref()
+            .map_or([0; ENCODERS], DescribedMechanism::counts)
+    }
+
+    fn currents(&self) -> [f32; MAX_JOINTS] {
+        self.mechanism
+            .as_ref()
+            .map_or([0.0; MAX_JOINTS], DescribedMechanism::driven)
+    }
+
     fn home(&mut self) {
         self.hardware.restart_counts();
         if let Some(mechanism) = &mut self.mechanism {

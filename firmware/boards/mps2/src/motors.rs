@@ -1,6 +1,7 @@
 //! The simulated mechanism behind an enable output that can be seen: LED 0 is on while motors are enabled.
 
 use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
+use mortise_protocol::limits::{MAX_ENCODERS, MAX_JOINTS};
 use mortise_protocol::rig::Rig;
 use mortise_simulation::simulated_rig::SimulatedRig;
 
@@ -53,6 +54,18 @@ impl Mechanism for Motors {
 
     fn count(&self) -> [f32; 2] {
         self.mechanism.count()
+    }
+
+    fn motors(&self) -> u8 {
+        self.mechanism.motors()
+    }
+
+    fn counts(&self) -> [i32; MAX_ENCODERS] {
+        self.mechanism.counts()
+    }
+
+    fn currents(&self) -> [f32; MAX_JOINTS] {
+        self.mechanism.currents()
     }
 
     fn home(&mut self) {

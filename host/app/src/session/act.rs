@@ -32,6 +32,7 @@ impl Session {
         }
         self.poll_instruction();
         self.poll_drag();
+        self.poll_readings();
         self.follow();
     }
 

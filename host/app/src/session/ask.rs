@@ -9,6 +9,7 @@ use super::history::{Signal, csv};
 use super::intent::{Intent, Traces};
 use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
+use super::rig_page::RigIntent;
 use super::state::Session;
 use super::threads::spawn;
 
@@ -18,6 +19,8 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
         Purpose::OpenModel => Intent::Open(path),
         Purpose::SaveProject => Intent::WriteProject { path, replace },
         Purpose::SaveTraces => Intent::SaveTraces { path, replace },
+        Purpose::OpenRig => Intent::Rig(RigIntent::Load(path)),
+        Purpose::SaveRig => Intent::Rig(RigIntent::Write { path, replace }),
     }
 }
 

@@ -15,6 +15,7 @@ use mortise_rig::RigSpec;
 use super::finding::NO_FIT;
 use super::link::Link;
 use super::moves::Motion;
+use super::rig_page::RigIntent;
 use super::state::Session;
 
 /// An action that the operator requests.
@@ -152,6 +153,8 @@ pub enum Intent {
     Record,
     /// End the recording.
     EndRecording,
+    /// An action on the page on the rig.
+    Rig(RigIntent),
     /// Let the simulated hand insert the peg into the hole.
     PlayInsertion,
     /// Run everything from the sample to the insertion automatically. `None`: the emulated board if it is available, else in-process.
@@ -191,6 +194,7 @@ impl Intent {
                 | Self::CancelInstruction
                 | Self::Record
                 | Self::EndRecording
+                | Self::Rig(RigIntent::Show(_))
                 | Self::Demo(_)
         )
     }
@@ -338,6 +342,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             (session.instructions.under_way().is_none()).then(|| "No instruction is under way".to_owned())
         }
         Intent::Record | Intent::EndRecording => record(session, intent),
+        Intent::Rig(intent) => session.no_rig_action(intent),
         Intent::PlayInsertion => play(session),
     }
 }
@@ -419,7 +424,9 @@ fn arm(session: &Session) -> Option<String> {
         DeviceState::Homing => return no("Bring the handle to its marked pose and set the reference first"),
         DeviceState::Stopped => return no("Stopped: clear the stop first"),
         DeviceState::Fault(_) => return no("Fault: see the messages, then clear it"),
-        DeviceState::Boot | DeviceState::SoftStop => return no("Wait until the board is idle"),
+        DeviceState::Boot | DeviceState::SoftStop | DeviceState::Testing => {
+            return no("Wait until the board is idle");
+        }
         DeviceState::Idle => {}
     }
     if session.document.is_none() {

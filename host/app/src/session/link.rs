@@ -16,19 +16,19 @@ use mortise_bake::Baked;
 use mortise_guide::GuideSettings;
 use mortise_mating::recognise::{Target, TargetId};
 use mortise_protocol::message::{Capabilities, DeviceState, HandScript, Statistics, ToDevice};
-use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_protocol::parameter::ParameterId;
+use mortise_protocol::rig::Rig;
+use mortise_rig::commissioning::both_ways;
 use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 
 use super::document::Document;
 use super::fits::FitChoice;
 use super::guidance;
+use super::introduction::{introduce, send_rig};
 use super::outbox::{LinkUpdate, Outbox, Update};
 use super::recording::Recorded;
 use super::tap::Tap;
 use super::threads::{Cancel, spawn};
-
-/// Ticks between telemetry messages: some 60 messages a second, half of what an emulated UART carries.
-pub const TELEMETRY_TICKS: u16 = 16;
 
 /// Time after the first missing answer within which a silent link is noticed.
 const NOTICED: Duration = Duration::from_secs(1);
@@ -64,6 +64,21 @@ pub enum Command {
     },
     /// End the recording.
     EndRecording,
+    /// Read the description that the board keeps.
+    ReadRig,
+    /// Send a description, restart the board, and read back what it uses.
+    SendRig(Box<Rig>),
+    /// Read encoders and inputs.
+    Readings,
+    /// The mechanism is in its reference pose.
+    Reference,
+    /// Test a motor both ways.
+    TestMotor {
+        /// Joint, from 0.
+        joint: u8,
+        /// Force at the handle, N.
+        force: f32,
+    },
 }
 
 /// State of the connection.
@@ -203,16 +218,6 @@ fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
     }
 }
 
-/// Requests telemetry and reads every parameter.
-fn introduce(client: &Client) -> Result<Vec<(ParameterId, f32)>, RigError> {
-    client.request(ToDevice::SetTelemetry {
-        every_ticks: TELEMETRY_TICKS,
-    })?;
-    (PARAMETERS.iter())
-        .map(|row| Ok((row.id, client.parameter(row.id)?)))
-        .collect()
-}
-
 fn carry_out(
     client: &Client,
     recorded: &mut Recorded,
@@ -262,6 +267,15 @@ fn carry_out(
         Command::Record { folder, scene } => {
             LinkUpdate::Recording(recorded.begin(client, &folder, scene.as_deref()))
         }
+        Command::ReadRig => LinkUpdate::Rig(client.rig().map_err(|error| error.to_string())),
+        Command::SendRig(rig) => LinkUpdate::RigSent(send_rig(client, *rig).map(Box::new)),
+        Command::Readings => LinkUpdate::Readings(client.readings().ok()),
+        Command::Reference => {
+            LinkUpdate::Referenced(client.request(ToDevice::Home).map_err(|error| error.to_string()))
+        }
+        Command::TestMotor { joint, force } => {
+            LinkUpdate::MotorTested(both_ways(client, joint, force).map_err(|error| error.to_string()))
+        }
         Command::EndRecording => (recorded.end(client)).map_or(LinkUpdate::Unanswered, LinkUpdate::Recording),
     }
 }
@@ -282,7 +296,7 @@ fn is_the_links(client: &Client, error: &RigError) -> bool {
 fn is_live(state: DeviceState) -> bool {
     matches!(
         state,
-        DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop
+        DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop | DeviceState::Testing
     )
 }
 

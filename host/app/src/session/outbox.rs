@@ -6,12 +6,14 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use mortise_bake::Baked;
 use mortise_guide::List;
-use mortise_protocol::message::{Statistics, ToDevice};
+use mortise_protocol::message::{MotorTest, Readings, Statistics, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_protocol::rig::Rig;
 use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 
 use super::document::Document;
 use super::fitting::FitsFound;
+use super::introduction::RigSent;
 use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
 use super::saved::Saved;
@@ -157,6 +159,16 @@ pub enum LinkUpdate {
     Statistics(Statistics),
     /// What became of a recording.
     Recording(RecordingUpdate),
+    /// The description that the board keeps, and whether it uses it; or one line with the reason why it was not read.
+    Rig(Result<(Option<Rig>, bool), String>),
+    /// A description was sent, and the board has started again; or one line with the reason why not.
+    RigSent(Result<Box<RigSent>, String>),
+    /// Readings of encoders and inputs; `None`: the board gave none.
+    Readings(Option<Readings>),
+    /// The reference was set, or one line with the reason why not.
+    Referenced(Result<(), String>),
+    /// A motor was tested both ways; `None`: the mechanism does not come to rest. Or one line with the reason why not.
+    MotorTested(Result<Option<[MotorTest; 2]>, String>),
 }
 
 /// Sending end of the window's queue. Wakes the window after each message.

@@ -123,6 +123,7 @@ impl Session {
             Intent::CancelInstruction => self.cancel_instruction(),
             Intent::Record => self.begin_recording(),
             Intent::EndRecording => self.end_recording(),
+            Intent::Rig(intent) => self.perform_on_rig(intent),
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
             Intent::Demo(rig) => self.demo(rig),
         }
@@ -203,6 +204,7 @@ impl Session {
         };
         link.close(false);
         self.clear_board();
+        self.rig_page.disconnected();
         if let Some(name) = name {
             self.notes
                 .add(Severity::Info, format!("Disconnected from {name}"));

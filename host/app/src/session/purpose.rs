@@ -9,6 +9,10 @@ pub enum Purpose {
     SaveTraces,
     /// The file for a project.
     SaveProject,
+    /// The description of a rig to open.
+    OpenRig,
+    /// The file for the description of a rig.
+    SaveRig,
 }
 
 impl Purpose {
@@ -18,12 +22,14 @@ impl Purpose {
             Self::OpenModel => "Open STEP file or project",
             Self::SaveProject => "Save project as",
             Self::SaveTraces => "Export traces as CSV",
+            Self::OpenRig => "Open description of a rig",
+            Self::SaveRig => "Save description of the rig as",
         }
     }
 
     /// Whether the file is written.
     pub fn is_saved(self) -> bool {
-        !matches!(self, Self::OpenModel)
+        !matches!(self, Self::OpenModel | Self::OpenRig)
     }
 
     /// An example of a path.
@@ -32,13 +38,15 @@ impl Purpose {
             Self::OpenModel => "/folder/assembly.step",
             Self::SaveTraces => "/folder/traces.csv",
             Self::SaveProject => "/folder/assembly.mortise",
+            Self::OpenRig | Self::SaveRig => "/folder/rig.toml",
         }
     }
 
     /// Suggested name of a new file.
     pub fn file_name(self) -> &'static str {
         match self {
-            Self::OpenModel => "",
+            Self::OpenModel | Self::OpenRig => "",
+            Self::SaveRig => "rig.toml",
             Self::SaveTraces => "traces.csv",
             Self::SaveProject => "assembly.mortise",
         }
@@ -53,6 +61,7 @@ impl Purpose {
             ),
             Self::SaveTraces => ("CSV", &["csv"]),
             Self::SaveProject => ("Mortise projects", &["mortise"]),
+            Self::OpenRig | Self::SaveRig => ("Descriptions of rigs", &["toml"]),
         }
     }
 }

@@ -27,6 +27,7 @@ use super::notes::Notes;
 use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
 use super::recording::Recording;
+use super::rig_page::RigPage;
 use super::sequencing::Sequencing;
 use super::threads::Cancel;
 use super::tour::Tour;
@@ -111,6 +112,8 @@ pub struct Session {
     pub sequencing: Sequencing,
     /// The part with which fits are found; `None`: the nearest ones.
     pub partner: Option<usize>,
+    /// The page on the rig.
+    pub rig_page: RigPage,
     /// Messages.
     pub notes: Notes,
     /// Contact method of the next bake.
@@ -180,6 +183,7 @@ impl Session {
             sequencing: Sequencing::default(),
             partner: None,
             ways: Ways::default(),
+            rig_page: RigPage::default(),
             notes: Notes::default(),
             method: Method::default(),
             recording: None,
@@ -238,7 +242,7 @@ impl Session {
     pub fn is_armed(&self) -> bool {
         matches!(
             self.device(),
-            Some(DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop)
+            Some(DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop | DeviceState::Testing)
         )
     }
 

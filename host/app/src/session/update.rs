@@ -176,6 +176,11 @@ fn link(session: &mut Session, update: LinkUpdate) {
         }
         LinkUpdate::Uploaded { generation, result } => uploaded(session, generation, result),
         LinkUpdate::Recording(update) => session.recording_update(update),
+        LinkUpdate::Rig(result) => session.rig_read(result),
+        LinkUpdate::RigSent(result) => session.rig_sent(result.map(|sent| *sent)),
+        LinkUpdate::Readings(readings) => session.readings(readings),
+        LinkUpdate::Referenced(result) => session.reference_set(result),
+        LinkUpdate::MotorTested(result) => session.motor_tested(result),
         LinkUpdate::Statistics(statistics) => {
             if let Some(connection) = session.connection_mut() {
                 connection.statistics = Some(statistics);
@@ -222,6 +227,7 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
     let capacity = u64::from(connection.capabilities.scene_capacity);
     session.link = Link::Connected(Box::new(connection));
     session.send_own_parameters();
+    session.show_board_rig();
     session.history.interrupt();
     let too_large = (session.document.as_ref())
         .and_then(|d| d.baked.as_ref())
@@ -277,6 +283,7 @@ fn event(session: &mut Session, event: Event) {
             }
             link.close(false);
             session.clear_board();
+            session.rig_page.disconnected();
             session.tour = None;
             session.notes.add(
                 Severity::Error,

@@ -3,6 +3,7 @@
 use egui::{Button, Shape, Stroke, Ui, Vec2};
 
 use super::{control, recent, theme};
+use crate::session::rig_page::{RigIntent, Workspace};
 use crate::session::{Intent, Session};
 
 /// Draws the button that opens the menu.
@@ -14,6 +15,14 @@ pub fn show(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<In
         let save = Button::new("Save project as…").frame(false);
         let hint = "Write placements, hidden parts, choices of fits, settings, signals and the rig to a file. They also save themselves, and come back when the model is opened again";
         if control::intent_button(ui, session, wanted, save, Intent::SaveProject, hint).clicked() {
+            ui.close();
+        }
+        let (workspace, text) = match session.rig_page.workspace {
+            Workspace::Assemble => (Workspace::Rig, "Show the rig's set-up"),
+            Workspace::Rig => (Workspace::Assemble, "Show the parts"),
+        };
+        if ui.add(Button::new(text).frame(false)).clicked() {
+            wanted.push(Intent::Rig(RigIntent::Show(workspace)));
             ui.close();
         }
         let keys = Button::new("Keys").frame(false);

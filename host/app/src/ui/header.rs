@@ -4,7 +4,7 @@ use egui::{Align, Layout, RichText, Ui, Vec2};
 use mortise_protocol::message::DeviceState;
 use mortise_rig::describe;
 
-use super::{control, file_menu, stop, theme, undo};
+use super::{control, file_menu, rig_page, stop, theme, undo};
 use crate::session::link::Link;
 use crate::session::{Intent, Session};
 
@@ -105,6 +105,10 @@ fn file(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<Intent
     if session.document.is_some() && ui.available_width() > 2.0 * (undo::WIDTH + GAP) {
         undo::show(ui, session, wanted, height);
     }
+    if ui.available_width() > rig_page::SWITCH + 60.0 {
+        rig_page::switch(ui, session, wanted, height);
+        ui.spacing_mut().item_spacing.x = GAP;
+    }
     if ui.available_width() > 40.0 {
         title(ui, session);
     }
@@ -137,7 +141,7 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Vec2) {
     let ink = theme::of(ui);
     let text = |text: &str| RichText::new(text).size(15.0).color(ink.text_strong);
     match session.device() {
-        Some(DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop) => {
+        Some(DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop | DeviceState::Testing) => {
             let button = egui::Button::new(text("Disarm")).min_size(size);
             control::intent_button(
                 ui,
@@ -205,6 +209,7 @@ fn state(ui: &mut Ui, session: &Session, width: f32) {
                 DeviceState::SoftStop => (ink.warning, "Stopping"),
                 DeviceState::Stopped => (theme::STOP_HOVER, "Stopped"),
                 DeviceState::Fault(_) => (theme::STOP_HOVER, "Fault"),
+                DeviceState::Testing => (ink.good, "Testing"),
             };
             let named = session.grabbed().and_then(|part| {
                 let document = session.document.as_ref()?;

@@ -7,8 +7,10 @@ mod arrange;
 mod cards;
 mod clearances;
 mod command;
+mod commissioning;
 mod control;
 mod cube;
+mod description;
 mod drop;
 mod eye;
 mod file_menu;
@@ -29,6 +31,7 @@ mod parts;
 pub mod plots;
 mod recent;
 mod rig;
+mod rig_page;
 mod section;
 mod sequence;
 #[cfg(unix)]
@@ -46,6 +49,7 @@ use egui::{Key, Modifiers, Ui};
 
 use self::arrange::Arrangement;
 use crate::session::link::Link;
+use crate::session::rig_page::Workspace;
 use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 use crate::viewport::surface::Surface;
@@ -223,6 +227,21 @@ impl Window {
                     .frame(side(0, 14))
                     .show(ui, |ui| plots::show(ui, session, &mut self.plots, wanted));
             });
+        if session.rig_page.workspace == Workspace::Assemble {
+            self.parts(ui, wanted);
+        }
+        let session = &mut self.session;
+        egui::Panel::right("rig")
+            .exact_size(336.0)
+            .resizable(false)
+            .frame(theme::panel(theme::of(ui)))
+            .show(ui, |ui| rig::show(ui, session, wanted));
+        self.picture(ui, surface, wanted);
+    }
+
+    /// Draws the panel of parts at the left.
+    fn parts(&mut self, ui: &mut Ui, wanted: &mut Vec<Intent>) {
+        let session = &mut self.session;
         egui::Panel::left("parts")
             .default_size(248.0)
             .size_range(180.0..=420.0)
@@ -242,12 +261,6 @@ impl Window {
                         )
                     });
             });
-        egui::Panel::right("rig")
-            .exact_size(336.0)
-            .resizable(false)
-            .frame(theme::panel(theme::of(ui)))
-            .show(ui, |ui| rig::show(ui, session, wanted));
-        self.picture(ui, surface, wanted);
     }
 
     /// Draws one panel at a time.
@@ -307,9 +320,15 @@ impl Window {
         }
     }
 
-    /// Draws the view and its overlays.
+    /// Draws the view and its overlays, or the page on the rig.
     fn picture(&mut self, ui: &mut Ui, surface: Option<&mut Surface>, wanted: &mut Vec<Intent>) {
         let session = &mut self.session;
+        if session.rig_page.workspace == Workspace::Rig {
+            egui::CentralPanel::default()
+                .frame(theme::panel(theme::of(ui)))
+                .show(ui, |ui| rig_page::show(ui, session, wanted));
+            return;
+        }
         egui::CentralPanel::default()
             .frame(egui::Frame::NONE.fill(theme::of(ui).ground))
             .show(ui, |ui| {

@@ -15,6 +15,10 @@ pub struct InputFault {
     pub what: InputFaultName,
     /// Encoder or motor: 0 to 2 are the handle's position, 3 to 5 its rotation.
     pub axis: Option<u8>,
+    /// The other encoder of a swapped pair.
+    pub with: Option<u8>,
+    /// Sense of an encoder or a motor.
+    pub reversed: Option<bool>,
     /// Error of an encoder, counts.
     pub counts: Option<i32>,
     /// Start, ms after the hand's start.
@@ -48,6 +52,14 @@ pub enum InputFaultName {
     StopOpen,
     /// The supply voltage is too low.
     SupplyLow,
+    /// An encoder counts in a sense of its own.
+    EncoderSense,
+    /// A motor pushes in a sense of its own.
+    MotorSense,
+    /// A motor gives no torque.
+    MotorDead,
+    /// Two encoders are plugged into each other's place.
+    EncodersSwapped,
 }
 
 impl InputFault {
@@ -58,10 +70,11 @@ impl InputFault {
     fn wire(&self) -> Result<message::InputFault, String> {
         use InputFaultName as N;
         let name = self.what;
-        let axis = || match self.axis {
+        let one = |key: &str, axis: Option<u8>| match axis {
             Some(axis) if axis < 6 => Ok(axis),
-            other => Err(format!("{name:?} needs an axis from 0 to 5, not {other:?}")),
+            other => Err(format!("{name:?} needs {key} from 0 to 5, not {other:?}")),
         };
+        let axis = || one("an axis", self.axis);
         let kind = match name {
             N::EncoderGlitch => InputFaultKind::EncoderGlitch {
                 axis: axis()?,
@@ -77,7 +90,26 @@ impl InputFault {
             N::NotANumber => InputFaultKind::NotANumber,
             N::StopOpen => InputFaultKind::StopOpen,
             N::SupplyLow => InputFaultKind::SupplyLow,
+            N::EncoderSense => InputFaultKind::EncoderSense {
+                axis: axis()?,
+                reversed: self.reversed.ok_or("EncoderSense needs `reversed`")?,
+            },
+            N::MotorSense => InputFaultKind::MotorSense {
+                axis: axis()?,
+                reversed: self.reversed.ok_or("MotorSense needs `reversed`")?,
+            },
+            N::MotorDead => InputFaultKind::MotorDead { axis: axis()? },
+            N::EncodersSwapped => InputFaultKind::EncodersSwapped {
+                axis: axis()?,
+                with: one("`with`", self.with)?,
+            },
         };
+        if self.reversed.is_some() && !matches!(name, N::EncoderSense | N::MotorSense) {
+            return Err(format!("{name:?} has no `reversed`"));
+        }
+        if self.with.is_some() && name != N::EncodersSwapped {
+            return Err(format!("{name:?} has no `with`"));
+        }
         if self.counts.is_some() && name != N::EncoderGlitch {
             return Err(format!("{name:?} has no counts"));
         }
@@ -110,6 +142,8 @@ mod tests {
         let sound = InputFault {
             what: InputFaultName::EncoderGlitch,
             axis: Some(2),
+            with: None,
+            reversed: None,
             counts: Some(-40),
             at_ms: 7,
             for_ms: 1,

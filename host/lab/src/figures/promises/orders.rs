@@ -4,7 +4,7 @@ use mortise_orders::{Broken, PROMISES, Report, enumerate, enumerate_topics};
 
 use crate::figures::{Plan, Row};
 
-/// Events in the longest orders over the whole alphabet, which orders no restart: some minutes in the full form, some seconds in the shorter one.
+/// Events in the longest orders over the whole alphabet, which orders no restart and no test of a motor: some minutes in the full form, some seconds in the shorter one.
 const DEPTH: usize = 8;
 const DEPTH_QUICK: usize = 6;
 /// Events in the longest orders over one topic.
@@ -19,7 +19,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
         (DEPTH, TOPIC_DEPTH)
     };
     rows(
-        &format!("orders of messages, all events but restarts, to depth {depth}"),
+        &format!("orders of messages, all events but restarts and tests, to depth {depth}"),
         &enumerate(depth),
         out,
     );

@@ -46,9 +46,10 @@ enum Before {
     FadingInFault,
     Stopped,
     Faulted,
+    Testing,
 }
 
-const STATES: [Before; 9] = [
+const STATES: [Before; 10] = [
     Before::Boot,
     Before::Homing,
     Before::Idle,
@@ -58,13 +59,14 @@ const STATES: [Before; 9] = [
     Before::FadingInFault,
     Before::Stopped,
     Before::Faulted,
+    Before::Testing,
 ];
 
 impl Before {
     fn live(self) -> bool {
         matches!(
             self,
-            Self::Armed | Self::Active | Self::Disarming | Self::FadingInFault
+            Self::Armed | Self::Active | Self::Disarming | Self::FadingInFault | Self::Testing
         )
     }
 }
@@ -159,8 +161,9 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
             }
             // The first fault is the one reported; some are no faults while the motors are off.
             let reported = matches!(state, Before::FadingInFault | Before::Faulted);
-            // A host that disarmed may leave before the fade ends.
-            let gone = state == Before::Disarming && matches!(fault, Fault::HostSilent { .. });
+            // A host that disarmed may leave before the fade ends, and a test ends sooner than a host counts as silent.
+            let gone = matches!(state, Before::Disarming | Before::Testing)
+                && matches!(fault, Fault::HostSilent { .. });
             let expected = !reported && !gone && (state.live() || seen_at_rest(fault));
             if expected && words.is_none_or(|said| said != describe(board.as_seen(fault))) {
                 unsaid.push(case);
@@ -225,6 +228,10 @@ impl Mechanism for Puppet {
 
     fn drive(&mut self, drive: Drive) {
         self.0.drive.set(drive);
+    }
+
+    fn motors(&self) -> u8 {
+        1
     }
 
     fn simulation(&mut self) -> Option<&mut dyn Simulation> {
@@ -385,7 +392,7 @@ impl<'c, 's> Board<'c, 's> {
         ) {
             self.say(&ToDevice::Arm);
         }
-        if state != Before::Armed && state.live() {
+        if !matches!(state, Before::Armed | Before::Testing) && state.live() {
             self.say(&ToDevice::Grab { part });
             // Builds up a wrench to fade: the handle is 4 mm ahead of the part.
             self.pull(|s| s.handle.position += Vec3::new(0.0, 0.0, 0.004));
@@ -398,6 +405,7 @@ impl<'c, 's> Board<'c, 's> {
                 self.tick();
             }
             Before::Stopped => self.say(&ToDevice::Stop),
+            Before::Testing => self.say(&ToDevice::TestMotor { joint: 0, force: 1.0 }),
             Before::Faulted => {
                 self.pull(|s| s.stop_open = true);
                 self.tick();
@@ -416,6 +424,7 @@ impl<'c, 's> Board<'c, 's> {
             Before::Disarming | Before::FadingInFault => reached == DeviceState::SoftStop,
             Before::Stopped => reached == DeviceState::Stopped,
             Before::Faulted => matches!(reached, DeviceState::Fault(_)),
+            Before::Testing => reached == DeviceState::Testing,
         }
     }
 
@@ -458,6 +467,7 @@ impl<'c, 's> Board<'c, 's> {
         let quiet = match self.strings.drive.get() {
             Drive::Off => !self.control.safety().live(),
             Drive::Wrench(wrench) => stopping && wrench.is_finite(),
+            Drive::Joint { .. } => false,
         };
         if let Some(Fault::HostSilent { silent_ms }) = self.reported {
             self.silent_ms = silent_ms;

@@ -1,0 +1,311 @@
+//! State of the page on the rig: its description as edited, the steps of commissioning, and the last seconds of its encoders. Pure.
+
+use std::collections::VecDeque;
+
+use mortise_protocol::message::{InputFaultKind, Readings};
+use mortise_protocol::rig::Rig;
+use mortise_rig::commissioning::Commissioning;
+use mortise_rig::{Abilities, abilities, parse_rig, write_rig};
+
+/// Examples of descriptions, to begin with: name and text.
+pub const EXAMPLES: [(&str, &str); 4] = [
+    ("hapkit", include_str!("../../../../firmware/rigs/hapkit.toml")),
+    (
+        "haply_2diy",
+        include_str!("../../../../firmware/rigs/haply_2diy.toml"),
+    ),
+    (
+        "woodenhaptics",
+        include_str!("../../../../firmware/rigs/woodenhaptics.toml"),
+    ),
+    ("polhem", include_str!("../../../../firmware/rigs/polhem.toml")),
+];
+
+/// Time that the traces of the encoders keep, s.
+pub const TRACE_S: f64 = 10.0;
+
+/// What the window does in its middle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Workspace {
+    /// The parts.
+    #[default]
+    Assemble,
+    /// The description of the rig and its commissioning.
+    Rig,
+}
+
+/// An action of the operator on the page on the rig.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RigIntent {
+    /// Show a workspace.
+    Show(Workspace),
+    /// Replace the text by the description that the board keeps.
+    Read,
+    /// Replace the text by an example.
+    Example(usize),
+    /// Ask for the file of a description.
+    Browse,
+    /// Replace the text by a file.
+    Load(std::path::PathBuf),
+    /// Ask where to write the description.
+    Save,
+    /// Write the description.
+    Write {
+        /// File to write.
+        path: std::path::PathBuf,
+        /// Whether an existing file may be replaced.
+        replace: bool,
+    },
+    /// Change the text.
+    Edit(String),
+    /// Send the description to the board, which restarts.
+    Send,
+    /// Begin commissioning with the description that the board uses.
+    Begin,
+    /// The present step was done by hand: judge it.
+    Done,
+    /// Test the motor of the present step.
+    TestMotor,
+    /// The mechanism is in its reference pose.
+    SetReference,
+    /// Send the corrections.
+    SendCorrections,
+    /// Go back one step and take its correction back.
+    Back,
+    /// End commissioning.
+    End,
+    /// A simulated operator does by hand what the present step asks for.
+    Simulate,
+    /// Wire the simulated mechanism in this way from now on.
+    Wire(Wiring),
+}
+
+/// How a simulated mechanism is wired, to try commissioning with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wiring {
+    /// As described.
+    #[default]
+    Sound,
+    /// The encoder of a joint counts the other way.
+    EncoderReversed(u8),
+    /// The encoder of a joint does not count.
+    EncoderDead(u8),
+    /// The motor of a joint pushes the other way.
+    MotorReversed(u8),
+    /// The motor of a joint does not push.
+    MotorDead(u8),
+    /// The wire of the stop button is broken.
+    StopOpen,
+}
+
+impl Wiring {
+    /// All ways for a mechanism with so many joints.
+    pub fn all(joints: u8) -> impl Iterator<Item = Self> {
+        let each = move |of: fn(u8) -> Self| (0..joints).map(of);
+        [Self::Sound]
+            .into_iter()
+            .chain(each(Self::EncoderReversed))
+            .chain(each(Self::EncoderDead))
+            .chain(each(Self::MotorReversed))
+            .chain(each(Self::MotorDead))
+            .chain([Self::StopOpen])
+    }
+
+    /// Its name.
+    pub fn name(self) -> String {
+        match self {
+            Self::Sound => "as described".into(),
+            Self::EncoderReversed(joint) => format!("encoder {} reversed", joint + 1),
+            Self::EncoderDead(joint) => format!("encoder {} unplugged", joint + 1),
+            Self::MotorReversed(joint) => format!("motor {} reversed", joint + 1),
+            Self::MotorDead(joint) => format!("motor {} unplugged", joint + 1),
+            Self::StopOpen => "wire of the stop button broken".into(),
+        }
+    }
+
+    /// The fault at the inputs of the mechanism that `rig` describes.
+    pub fn fault(self, rig: &Rig) -> Option<InputFaultKind> {
+        let joint = |axis: u8| rig.joints.get(usize::from(axis));
+        match self {
+            Self::Sound => None,
+            Self::EncoderReversed(axis) => joint(axis).map(|joint| InputFaultKind::EncoderSense {
+                axis,
+                reversed: !joint.encoder_reversed,
+            }),
+            Self::EncoderDead(axis) => Some(InputFaultKind::EncoderStuck { axis }),
+            Self::MotorReversed(axis) => joint(axis).map(|joint| InputFaultKind::MotorSense {
+                axis,
+                reversed: !joint.motor_reversed,
+            }),
+            Self::MotorDead(axis) => Some(InputFaultKind::MotorDead { axis }),
+            Self::StopOpen => Some(InputFaultKind::StopOpen),
+        }
+    }
+}
+
+/// What a description is worth.
+#[derive(Clone, Debug)]
+pub struct Checked {
+    /// The description.
+    pub rig: Rig,
+    /// What the rig will be able to do.
+    pub abilities: Abilities,
+}
+
+/// See the module.
+#[derive(Default)]
+pub struct RigPage {
+    /// What the window shows in its middle.
+    pub workspace: Workspace,
+    text: String,
+    /// Where the text comes from.
+    pub origin: String,
+    checked: Option<Result<Box<Checked>, String>>,
+    /// The description that the board keeps, and whether it uses it; `None`: not read yet.
+    pub on_board: Option<(Option<Rig>, bool)>,
+    /// Commissioning under way.
+    pub steps: Option<Commissioning>,
+    /// What the board is busy with, for this page.
+    pub busy: Option<&'static str>,
+    /// The wiring of a simulated mechanism, and the fault that it stands for.
+    pub wiring: (Wiring, Option<InputFaultKind>),
+    /// Readings were asked for and have not come yet.
+    pub(super) is_reading: bool,
+    /// Time and joint angles in the description's sense, rad.
+    trace: VecDeque<(f64, [f32; 3])>,
+}
+
+impl RigPage {
+    /// The text of the description.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Replaces the text.
+    pub fn set_text(&mut self, text: String, origin: &str) {
+        origin.clone_into(&mut self.origin);
+        self.edit(text);
+    }
+
+    /// Changes the text.
+    pub fn edit(&mut self, text: String) {
+        self.checked = match text.trim() {
+            "" => None,
+            _ => Some(check(&text)),
+        };
+        self.text = text;
+    }
+
+    /// The text as a description, or what is wrong with it; `None` without text.
+    pub fn checked(&self) -> Option<Result<&Checked, &str>> {
+        match self.checked.as_ref()? {
+            Ok(checked) => Some(Ok(checked)),
+            Err(why) => Some(Err(why)),
+        }
+    }
+
+    /// Whether the text describes what the board uses.
+    pub fn is_in_use(&self) -> bool {
+        match (&self.checked, &self.on_board) {
+            // The board has a description in single precision, the text six digits of it.
+            (Some(Ok(checked)), Some((Some(kept), true))) => write_rig(&checked.rig) == write_rig(kept),
+            _ => false,
+        }
+    }
+
+    /// Takes readings in.
+    pub fn see(&mut self, readings: &Readings, tick_hz: u16) {
+        let time = f64::from(readings.tick) / f64::from(tick_hz.max(1));
+        // A board that has started again counts from 0.
+        if self.trace.back().is_some_and(|&(last, _)| last >= time) {
+            self.trace.clear();
+        }
+        let rig = match (&self.steps, &self.on_board) {
+            (Some(steps), _) => Some(steps.rig()),
+            (None, Some((rig, true))) => rig.as_ref(),
+            _ => None,
+        };
+        if let Some(rig) = rig {
+            let angles = std::array::from_fn(|joint| {
+                let described = rig.joints.get(joint);
+                described.map_or(0.0, |described| {
+                    described.home + readings.counts[joint] as f32 * described.radians_per_count()
+                })
+            });
+            self.trace.push_back((time, angles));
+        }
+        while self
+            .trace
+            .front()
+            .is_some_and(|&(first, _)| first < time - TRACE_S)
+        {
+            self.trace.pop_front();
+        }
+        if let Some(steps) = &mut self.steps {
+            steps.see(readings);
+        }
+    }
+
+    /// Times, s, and angles of the joints, rad, oldest first.
+    pub fn trace(&self) -> impl DoubleEndedIterator<Item = &(f64, [f32; 3])> + ExactSizeIterator {
+        self.trace.iter()
+    }
+
+    /// Forgets what belongs to a board that is no longer connected; the text stays.
+    pub fn disconnected(&mut self) {
+        self.on_board = None;
+        self.steps = None;
+        self.busy = None;
+        self.is_reading = false;
+        self.wiring = Default::default();
+        self.trace.clear();
+    }
+}
+
+fn check(text: &str) -> Result<Box<Checked>, String> {
+    let rig = parse_rig(text, "description").map_err(|error| {
+        let words = error.to_string();
+        let words = words.strip_prefix("description: ").map(str::to_owned);
+        words.unwrap_or_else(|| error.to_string())
+    })?;
+    let abilities = abilities(&rig).map_err(mortise_rig::describe)?;
+    Ok(Box::new(Checked { rig, abilities }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_example_is_sound_and_a_damaged_one_says_where() {
+        let mut page = RigPage::default();
+        assert!(page.checked().is_none());
+        for (name, text) in EXAMPLES {
+            page.set_text(text.to_owned(), name);
+            assert!(matches!(page.checked(), Some(Ok(_))), "{name}");
+            page.edit(text.replace("counts_per_turn", "counts_per_turns"));
+            match page.checked() {
+                Some(Err(why)) => assert!(why.contains("line") && !why.starts_with("description"), "{why}"),
+                _ => panic!("{name} was damaged"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_text_is_in_use_when_the_board_has_the_same_numbers() {
+        let mut page = RigPage::default();
+        let (_, text) = EXAMPLES[2];
+        page.set_text(text.to_owned(), "an example");
+        let Some(Ok(checked)) = page.checked() else {
+            panic!()
+        };
+        let rig = checked.rig.clone();
+        assert!(!page.is_in_use());
+        page.on_board = Some((Some(rig.clone()), false));
+        assert!(!page.is_in_use());
+        page.on_board = Some((Some(rig), true));
+        assert!(page.is_in_use());
+        page.edit(text.replace("upper_mm = 205", "upper_mm = 206"));
+        assert!(!page.is_in_use());
+    }
+}

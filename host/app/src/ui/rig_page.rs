@@ -1,0 +1,77 @@
+//! The workspace for the rig: its description on the left, its commissioning on the right.
+
+use egui::{ScrollArea, Ui, Vec2};
+
+use super::{commissioning, control, description, theme};
+use crate::session::rig_page::{RigIntent, Workspace};
+use crate::session::{Intent, Session};
+
+/// Width from which the two stand side by side, points.
+const SIDE_BY_SIDE: f32 = 640.0;
+/// Width of the two buttons that choose the workspace, points.
+pub const SWITCH: f32 = 150.0;
+
+/// Draws the page.
+pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let side_by_side = ui.available_width() >= SIDE_BY_SIDE;
+    let size = ui.available_size();
+    if side_by_side {
+        ui.horizontal_top(|ui| {
+            let half = Vec2::new(0.5 * (size.x - 24.0), size.y);
+            for (name, draw) in [
+                (
+                    "description",
+                    description::show as fn(&mut Ui, &Session, &mut Vec<Intent>),
+                ),
+                ("commissioning", commissioning::show),
+            ] {
+                ui.allocate_ui(half, |ui| {
+                    scrolled(ui, name, |ui| draw(ui, session, wanted));
+                });
+                ui.add_space(12.0);
+            }
+        });
+    } else {
+        scrolled(ui, "rig page", |ui| {
+            commissioning::show(ui, session, wanted);
+            control::divider(ui);
+            description::show(ui, session, wanted);
+        });
+    }
+}
+
+fn scrolled(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {
+    ScrollArea::vertical()
+        .id_salt(name)
+        .auto_shrink([false, false])
+        .show(ui, |ui| {
+            // The scroll bar covers no values.
+            let width = ui.available_width() - 10.0;
+            ui.vertical(|ui| {
+                ui.set_max_width(width);
+                draw(ui);
+            });
+        });
+}
+
+/// Draws the buttons that choose the workspace.
+pub fn switch(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
+    ui.spacing_mut().item_spacing.x = 2.0;
+    for (workspace, name, hint) in [
+        (Workspace::Assemble, "Assemble", "Show the parts"),
+        (
+            Workspace::Rig,
+            "Set up rig",
+            "Describe the rig, and try its encoders, stop button and motors one by one",
+        ),
+    ] {
+        let chosen = session.rig_page.workspace == workspace;
+        let text = egui::RichText::new(name)
+            .size(12.5)
+            .color(theme::of(ui).text_strong);
+        let button = egui::Button::selectable(chosen, text).min_size(Vec2::new(0.0, height));
+        if ui.add(button).on_hover_text(hint).clicked() {
+            wanted.push(Intent::Rig(RigIntent::Show(workspace)));
+        }
+    }
+}
