@@ -12,6 +12,7 @@ use mortise_rig::{Client, Event, RigError, begin_message, chunk_message};
 
 use crate::described::descriptions_are_kept_and_driven;
 use crate::image;
+use crate::motors::motors_are_tested_one_by_one;
 use crate::verdict::Verdict;
 
 /// A check with its name.
@@ -31,6 +32,7 @@ pub const CHECKS: &[Check] = &[
         "descriptions_are_kept_and_driven",
         descriptions_are_kept_and_driven,
     ),
+    ("motors_are_tested_one_by_one", motors_are_tested_one_by_one),
 ];
 
 fn fine<T>(result: Result<T, RigError>) -> Result<T, String> {

@@ -6,6 +6,7 @@
 pub mod checks;
 mod described;
 mod image;
+mod motors;
 pub mod verdict;
 
 use std::path::{Path, PathBuf};

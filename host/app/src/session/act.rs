@@ -32,7 +32,6 @@ impl Session {
         }
         self.poll_instruction();
         self.poll_drag();
-        self.poll_readings();
         self.follow();
     }
 

@@ -21,6 +21,7 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
         Purpose::SaveTraces => Intent::SaveTraces { path, replace },
         Purpose::OpenRig => Intent::Rig(RigIntent::Load(path)),
         Purpose::SaveRig => Intent::Rig(RigIntent::Write { path, replace }),
+        Purpose::SaveRigReport => Intent::Rig(RigIntent::WriteReport { path, replace }),
     }
 }
 

@@ -26,6 +26,7 @@ use super::fits::FitChoice;
 use super::guidance;
 use super::introduction::{introduce, send_rig};
 use super::outbox::{LinkUpdate, Outbox, Update};
+use super::readings::ReadingsWatch;
 use super::recording::Recorded;
 use super::tap::Tap;
 use super::threads::{Cancel, spawn};
@@ -68,8 +69,6 @@ pub enum Command {
     ReadRig,
     /// Send a description, restart the board, and read back what it uses.
     SendRig(Box<Rig>),
-    /// Read encoders and inputs.
-    Readings,
     /// The mechanism is in its reference pose.
     Reference,
     /// Test a motor both ways.
@@ -269,7 +268,6 @@ fn carry_out(
         }
         Command::ReadRig => LinkUpdate::Rig(client.rig().map_err(|error| error.to_string())),
         Command::SendRig(rig) => LinkUpdate::RigSent(send_rig(client, *rig).map(Box::new)),
-        Command::Readings => LinkUpdate::Readings(client.readings().ok()),
         Command::Reference => {
             LinkUpdate::Referenced(client.request(ToDevice::Home).map_err(|error| error.to_string()))
         }
@@ -446,6 +444,11 @@ impl Connection {
             };
             outbox.send(Update::Link { id, update });
         });
+    }
+
+    /// Reads encoders and inputs until the result is dropped.
+    pub fn watch_readings(&self, outbox: Outbox) -> ReadingsWatch {
+        ReadingsWatch::begin(Arc::downgrade(&self.client), outbox, self.id)
     }
 
     /// Moves the simulated hand. Only the newest script waits.

@@ -35,6 +35,7 @@ pub mod pose;
 pub mod project;
 mod project_file;
 pub mod purpose;
+pub mod readings;
 mod record;
 pub mod recording;
 pub mod remaining;

@@ -163,8 +163,8 @@ pub enum LinkUpdate {
     Rig(Result<(Option<Rig>, bool), String>),
     /// A description was sent, and the board has started again; or one line with the reason why not.
     RigSent(Result<Box<RigSent>, String>),
-    /// Readings of encoders and inputs; `None`: the board gave none.
-    Readings(Option<Readings>),
+    /// Readings of encoders and inputs.
+    Readings(Readings),
     /// The reference was set, or one line with the reason why not.
     Referenced(Result<(), String>),
     /// A motor was tested both ways; `None`: the mechanism does not come to rest. Or one line with the reason why not.

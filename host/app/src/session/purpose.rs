@@ -13,6 +13,8 @@ pub enum Purpose {
     OpenRig,
     /// The file for the description of a rig.
     SaveRig,
+    /// The file for a report of commissioning.
+    SaveRigReport,
 }
 
 impl Purpose {
@@ -24,6 +26,7 @@ impl Purpose {
             Self::SaveTraces => "Export traces as CSV",
             Self::OpenRig => "Open description of a rig",
             Self::SaveRig => "Save description of the rig as",
+            Self::SaveRigReport => "Save report of commissioning as",
         }
     }
 
@@ -39,6 +42,7 @@ impl Purpose {
             Self::SaveTraces => "/folder/traces.csv",
             Self::SaveProject => "/folder/assembly.mortise",
             Self::OpenRig | Self::SaveRig => "/folder/rig.toml",
+            Self::SaveRigReport => "/folder/commissioning.md",
         }
     }
 
@@ -47,6 +51,7 @@ impl Purpose {
         match self {
             Self::OpenModel | Self::OpenRig => "",
             Self::SaveRig => "rig.toml",
+            Self::SaveRigReport => "commissioning.md",
             Self::SaveTraces => "traces.csv",
             Self::SaveProject => "assembly.mortise",
         }
@@ -62,6 +67,7 @@ impl Purpose {
             Self::SaveTraces => ("CSV", &["csv"]),
             Self::SaveProject => ("Mortise projects", &["mortise"]),
             Self::OpenRig | Self::SaveRig => ("Descriptions of rigs", &["toml"]),
+            Self::SaveRigReport => ("Markdown", &["md"]),
         }
     }
 }

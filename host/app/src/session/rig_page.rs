@@ -4,8 +4,10 @@ use std::collections::VecDeque;
 
 use mortise_protocol::message::{InputFaultKind, Readings};
 use mortise_protocol::rig::Rig;
-use mortise_rig::commissioning::Commissioning;
+use mortise_rig::commissioning::{Commissioning, operator};
 use mortise_rig::{Abilities, abilities, parse_rig, write_rig};
+
+use super::readings::ReadingsWatch;
 
 /// Examples of descriptions, to begin with: name and text.
 pub const EXAMPLES: [(&str, &str); 4] = [
@@ -56,6 +58,15 @@ pub enum RigIntent {
         /// Whether an existing file may be replaced.
         replace: bool,
     },
+    /// Ask where to write a report of commissioning.
+    SaveReport,
+    /// Write the report.
+    WriteReport {
+        /// File to write.
+        path: std::path::PathBuf,
+        /// Whether an existing file may be replaced.
+        replace: bool,
+    },
     /// Change the text.
     Edit(String),
     /// Send the description to the board, which restarts.
@@ -70,6 +81,8 @@ pub enum RigIntent {
     SetReference,
     /// Send the corrections.
     SendCorrections,
+    /// Begin the present step again, from the present pose.
+    Again,
     /// Go back one step and take its correction back.
     Back,
     /// End commissioning.
@@ -169,8 +182,11 @@ pub struct RigPage {
     pub busy: Option<&'static str>,
     /// The wiring of a simulated mechanism, and the fault that it stands for.
     pub wiring: (Wiring, Option<InputFaultKind>),
-    /// Readings were asked for and have not come yet.
-    pub(super) is_reading: bool,
+    /// Reads encoders and inputs while the page shows them.
+    pub(super) watch: Option<ReadingsWatch>,
+    newest: Option<Readings>,
+    /// Tick at which the simulated operator began to bring the mechanism to the pose from which it turns a joint.
+    pub(super) hand_since: Option<u32>,
     /// Time and joint angles in the description's sense, rad.
     trace: VecDeque<(f64, [f32; 3])>,
 }
@@ -241,9 +257,63 @@ impl RigPage {
         {
             self.trace.pop_front();
         }
+        self.newest = Some(*readings);
+        let Some(steps) = &mut self.steps else { return };
+        steps.see(readings);
+        if self
+            .hand_since
+            .is_some_and(|since| readings.tick.wrapping_sub(since) >= operator::READY)
+        {
+            self.hand_since = None;
+            steps.again();
+        }
+    }
+
+    /// Commissioning so far as a text in Markdown, for the board and its firmware `board`; `None`: it has not begun.
+    pub fn report(&self, board: &str) -> Option<String> {
+        let steps = self.steps.as_ref()?;
+        let mut text = format!(
+            "# Commissioning of {}\n\n{board}\n\n| step | result | what was seen |\n|---|---|---|\n",
+            steps.rig().name
+        );
+        for (number, (step, outcome)) in steps.steps().enumerate() {
+            let result = outcome.name();
+            let words = outcome.words().replace('|', "/");
+            text += &format!("| {}. {} | {result} | {words} |\n", number + 1, step.name());
+        }
+        text += &format!(
+            "\nDescription that the board uses:\n\n```toml\n{}```\n",
+            write_rig(steps.in_use())
+        );
+        Some(text)
+    }
+
+    /// The newest readings.
+    pub fn newest(&self) -> Option<&Readings> {
+        self.newest.as_ref()
+    }
+
+    /// The board keeps this description, and whether it uses it. Commissioning goes on with it if it has the same joints.
+    pub fn found(&mut self, rig: Option<Rig>, in_use: bool) {
         if let Some(steps) = &mut self.steps {
+            match rig.as_ref().filter(|_| in_use) {
+                Some(rig) if rig.joints.len() == steps.rig().joints.len() => steps.sent(Ok(rig.clone())),
+                _ => self.steps = None,
+            }
+        }
+        self.on_board = Some((rig, in_use));
+    }
+
+    /// Begins commissioning, if the board uses a description.
+    pub fn begin(&mut self) {
+        let Some((Some(rig), true)) = &self.on_board else {
+            return;
+        };
+        let mut steps = Commissioning::new(rig.clone());
+        if let Some(readings) = &self.newest {
             steps.see(readings);
         }
+        self.steps = Some(steps);
     }
 
     /// Times, s, and angles of the joints, rad, oldest first.
@@ -253,10 +323,17 @@ impl RigPage {
 
     /// Forgets what belongs to a board that is no longer connected; the text stays.
     pub fn disconnected(&mut self) {
-        self.on_board = None;
+        self.link_lost();
         self.steps = None;
+    }
+
+    /// As [`Self::disconnected`], but commissioning goes on when the board is connected again: one on a USB port of its own leaves it as it restarts.
+    pub fn link_lost(&mut self) {
+        self.on_board = None;
         self.busy = None;
-        self.is_reading = false;
+        self.watch = None;
+        self.newest = None;
+        self.hand_since = None;
         self.wiring = Default::default();
         self.trace.clear();
     }
@@ -289,6 +366,24 @@ mod tests {
                 _ => panic!("{name} was damaged"),
             }
         }
+    }
+
+    #[test]
+    fn commissioning_goes_on_when_the_board_comes_back_and_not_on_another_one() {
+        let rigs = EXAMPLES.map(|(name, text)| parse_rig(text, name).expect(name));
+        let mut page = RigPage::default();
+        page.found(Some(rigs[2].clone()), true);
+        page.begin();
+        page.link_lost();
+        assert!(page.steps.is_some() && page.on_board.is_none());
+        page.found(Some(rigs[2].clone()), true);
+        assert!(page.steps.is_some());
+        page.link_lost();
+        page.found(Some(rigs[1].clone()), true);
+        assert!(page.steps.is_none(), "another mechanism");
+        page.begin();
+        page.found(Some(rigs[1].clone()), false);
+        assert!(page.steps.is_none(), "not in use");
     }
 
     #[test]

@@ -26,6 +26,10 @@ impl Session {
         let reason = match intent {
             RigIntent::Show(_) | RigIntent::Example(_) | RigIntent::Edit(_) => return None,
             RigIntent::Browse | RigIntent::Load(_) | RigIntent::End => return None,
+            RigIntent::SaveReport | RigIntent::WriteReport { .. } => match self.rig_page.steps {
+                Some(_) => return None,
+                None => "Begin commissioning first",
+            },
             RigIntent::Save | RigIntent::Write { .. } => match self.rig_page.checked() {
                 Some(Ok(_)) => return None,
                 Some(Err(_)) => "Correct the description first",
@@ -89,8 +93,10 @@ impl Session {
             (RigIntent::TestMotor, Some(Step::Motor(_)))
             | (RigIntent::SetReference, Some(Step::Reference))
             | (RigIntent::SendCorrections, Some(Step::Send)) => None,
-            (RigIntent::Done, Some(Step::Encoder(_) | Step::StopInput | Step::Workspace)) => None,
-            (RigIntent::Simulate, Some(Step::Encoder(_) | Step::StopInput | Step::Workspace)) => None,
+            (
+                RigIntent::Done | RigIntent::Again | RigIntent::Simulate,
+                Some(Step::Encoder(_) | Step::StopInput | Step::Workspace),
+            ) => None,
             _ => Some("The present step asks for something else"),
         }
     }
@@ -118,6 +124,12 @@ impl Session {
             RigIntent::Write { path, replace } => {
                 write(&self.outbox, path, replace, self.rig_page.text().to_owned());
             }
+            RigIntent::SaveReport => self.ask_for_path(Purpose::SaveRigReport),
+            RigIntent::WriteReport { path, replace } => {
+                if let Some(report) = self.rig_page.report(&self.board_in_words()) {
+                    write(&self.outbox, path, replace, report);
+                }
+            }
             RigIntent::Edit(text) => self.rig_page.edit(text),
             RigIntent::Send => {
                 if let Some(Ok(checked)) = self.rig_page.checked() {
@@ -130,13 +142,10 @@ impl Session {
                     self.send_rig(steps.rig().clone());
                 }
             }
-            RigIntent::Begin => {
-                if let Some((Some(rig), _)) = &self.rig_page.on_board {
-                    self.rig_page.steps = Some(Commissioning::new(rig.clone()));
-                }
-            }
+            RigIntent::Begin => self.rig_page.begin(),
             RigIntent::End => self.rig_page.steps = None,
             RigIntent::Done => self.with_steps(Commissioning::done),
+            RigIntent::Again => self.with_steps(Commissioning::again),
             RigIntent::Back => self.with_steps(Commissioning::back),
             RigIntent::SetReference => {
                 self.rig_page.busy = Some("The reference is being set");
@@ -153,6 +162,31 @@ impl Session {
         }
     }
 
+    /// Board and firmware, for a report.
+    fn board_in_words(&self) -> String {
+        let release = env!("CARGO_PKG_VERSION");
+        self.connection().map_or_else(
+            || format!("Not connected; Mortise {release}."),
+            |connection| {
+                let can = &connection.capabilities;
+                // Program and firmware of a session are of one release.
+                format!(
+                    "Board {} at {}, {} Hz, release {release}; longest loop time {}.",
+                    can.board,
+                    connection.spec,
+                    can.tick_hz,
+                    connection.statistics.map_or_else(
+                        || "not measured".to_owned(),
+                        |counters| format!(
+                            "{} of {} {:?}",
+                            counters.cost_max, can.cost_budget, can.cost_unit
+                        )
+                    )
+                )
+            },
+        )
+    }
+
     fn with_steps(&mut self, act: impl FnOnce(&mut Commissioning)) {
         if let Some(steps) = &mut self.rig_page.steps {
             act(steps);
@@ -167,6 +201,7 @@ impl Session {
 
     fn show_workspace(&mut self, workspace: Workspace) {
         self.rig_page.workspace = workspace;
+        self.watch_readings();
         self.show_board_rig();
     }
 
@@ -201,25 +236,28 @@ impl Session {
         self.command(Command::TestMotor { joint, force: TEST_N });
     }
 
-    /// Asks for readings while the page shows them and none are under way.
-    pub(super) fn poll_readings(&mut self) {
-        let page = &mut self.rig_page;
-        let shown =
-            page.workspace == Workspace::Rig && page.on_board.as_ref().is_some_and(|(rig, _)| rig.is_some());
-        // Behind a restart or a test they would only wait.
-        if shown && !page.is_reading && page.busy.is_none() {
-            page.is_reading = true;
-            self.command(Command::Readings);
+    /// Reads encoders and inputs while the page shows them, and no longer.
+    fn watch_readings(&mut self) {
+        let page = &self.rig_page;
+        let is_described = page
+            .on_board
+            .as_ref()
+            .is_some_and(|(rig, in_use)| rig.is_some() && *in_use);
+        let watched = page.workspace == Workspace::Rig && is_described;
+        if !watched {
+            self.rig_page.watch = None;
+        } else if self.rig_page.watch.is_none() {
+            let outbox = self.outbox.clone();
+            self.rig_page.watch = self
+                .connection()
+                .map(|connection| connection.watch_readings(outbox));
         }
     }
 
-    pub(super) fn readings(&mut self, readings: Option<Readings>) {
-        self.rig_page.is_reading = false;
-        let hz = self
-            .connection()
-            .map(|connection| connection.capabilities.tick_hz);
-        if let (Some(readings), Some(hz)) = (readings, hz) {
-            self.rig_page.see(&readings, hz);
+    pub(super) fn readings(&mut self, readings: &Readings) {
+        if let Some(connection) = self.connection() {
+            let hz = connection.capabilities.tick_hz;
+            self.rig_page.see(readings, hz);
         }
     }
 
@@ -231,7 +269,8 @@ impl Session {
                 if let Some(rig) = &rig {
                     self.rig_page.set_text(write_rig(rig), "the board");
                 }
-                self.rig_page.on_board = Some((rig, in_use));
+                self.rig_page.found(rig, in_use);
+                self.watch_readings();
             }
             Err(why) => self.notes.add(Severity::Error, why),
         }
@@ -261,6 +300,7 @@ impl Session {
                     ),
                 );
                 self.rig_page.on_board = Some((Some(sent.rig.clone()), true));
+                self.watch_readings();
                 self.wire(&[]);
                 Ok(sent.rig)
             }
@@ -324,8 +364,15 @@ impl Session {
                 ticks: PRESSED,
                 kind: InputFaultKind::StopOpen,
             }]),
-            Some(Step::Encoder(joint)) => self.lead(operator::turn(steps, joint)),
-            Some(Step::Workspace) => self.lead(operator::reach(steps)),
+            Some(Step::Encoder(joint)) => {
+                let hand = operator::turn(steps.in_use(), joint);
+                self.rig_page.hand_since = self.rig_page.newest().map(|readings| readings.tick);
+                self.lead(hand);
+            }
+            Some(Step::Workspace) => {
+                let hand = operator::reach(steps.in_use());
+                self.lead(hand);
+            }
             _ => {}
         }
     }

@@ -178,7 +178,7 @@ fn link(session: &mut Session, update: LinkUpdate) {
         LinkUpdate::Recording(update) => session.recording_update(update),
         LinkUpdate::Rig(result) => session.rig_read(result),
         LinkUpdate::RigSent(result) => session.rig_sent(result.map(|sent| *sent)),
-        LinkUpdate::Readings(readings) => session.readings(readings),
+        LinkUpdate::Readings(readings) => session.readings(&readings),
         LinkUpdate::Referenced(result) => session.reference_set(result),
         LinkUpdate::MotorTested(result) => session.motor_tested(result),
         LinkUpdate::Statistics(statistics) => {
@@ -283,7 +283,7 @@ fn event(session: &mut Session, event: Event) {
             }
             link.close(false);
             session.clear_board();
-            session.rig_page.disconnected();
+            session.rig_page.link_lost();
             session.tour = None;
             session.notes.add(
                 Severity::Error,

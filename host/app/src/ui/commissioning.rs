@@ -48,6 +48,7 @@ fn list(ui: &mut Ui, steps: &Commissioning) {
     let ink = theme::of(ui);
     egui::Grid::new("steps")
         .num_columns(3)
+        .min_row_height(17.0)
         .spacing(Vec2::new(14.0, 1.0))
         .show(ui, |ui| {
             for (number, (step, outcome)) in steps.steps().enumerate() {
@@ -98,6 +99,11 @@ fn present(ui: &mut Ui, session: &Session, steps: &Commissioning, wanted: &mut V
                 control::intent_button(ui, session, wanted, button, Intent::Rig(intent), "");
             }
             let plain = |text: &str| egui::Button::new(text.to_owned()).min_size(Vec2::new(72.0, 30.0));
+            if matches!(steps.step(), Some(Step::Encoder(_) | Step::Workspace)) {
+                let hint = "Begin this step again, from the present pose";
+                let intent = Intent::Rig(RigIntent::Again);
+                control::intent_button(ui, session, wanted, plain("From here"), intent, hint);
+            }
             let hint = "Take the step before back, with its correction";
             control::intent_button(
                 ui,
@@ -107,6 +113,9 @@ fn present(ui: &mut Ui, session: &Session, steps: &Commissioning, wanted: &mut V
                 Intent::Rig(RigIntent::Back),
                 hint,
             );
+            let hint = "Write the steps and their results to a file";
+            let intent = Intent::Rig(RigIntent::SaveReport);
+            control::intent_button(ui, session, wanted, plain("Report…"), intent, hint);
             let hint = "What was sent stays on the board";
             control::intent_button(
                 ui,
@@ -125,7 +134,7 @@ fn present(ui: &mut Ui, session: &Session, steps: &Commissioning, wanted: &mut V
 fn action(steps: &Commissioning) -> Option<(&'static str, RigIntent)> {
     Some(match steps.step()? {
         Step::Encoder(_) => ("I have turned it", RigIntent::Done),
-        Step::Send => ("Send corrections", RigIntent::SendCorrections),
+        Step::Send => ("Send them now", RigIntent::SendCorrections),
         Step::Reference => ("Set reference", RigIntent::SetReference),
         Step::StopInput => ("Nothing happens", RigIntent::Done),
         Step::Motor(_) => ("Test motor", RigIntent::TestMotor),
@@ -226,6 +235,7 @@ fn simulated(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         let list = egui::ComboBox::from_id_salt("wiring")
             .selected_text(format!("Wired: {}", now.name()))
             .width(200.0)
+            .height(420.0)
             .show_ui(ui, |ui| {
                 for wiring in Wiring::all(rig.joints.len() as u8) {
                     if ui.selectable_label(wiring == now, wiring.name()).clicked() {

@@ -102,6 +102,24 @@ fn check(harness: &mut Harness<'_, Window>, state: &str, what: &str) {
 }
 
 #[test]
+fn stop_and_the_state_are_on_screen_in_the_workspace_for_the_rig() {
+    use mortise::session::Intent;
+    use mortise::session::rig_page::{RigIntent, Workspace};
+    let mut harness = harness();
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::Rig(RigIntent::Show(Workspace::Rig)));
+    session.act(Intent::Rig(RigIntent::Example(3)));
+    session.act(Intent::Connect);
+    until(&mut harness, "the description was read", |s| {
+        s.rig_page.on_board.is_some()
+    });
+    harness.state_mut().session.act(Intent::Rig(RigIntent::Send));
+    until(&mut harness, "the board uses it", |s| s.rig_page.is_in_use());
+    harness.state_mut().session.act(Intent::Rig(RigIntent::Begin));
+    check(&mut harness, "Idle", "commissioning");
+}
+
+#[test]
 fn stop_and_the_state_are_on_screen_at_every_size_and_scale() {
     let mut harness = harness();
     harness.run_steps(2);

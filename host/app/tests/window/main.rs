@@ -20,6 +20,7 @@ mod picture;
 mod plots;
 mod project;
 mod recording;
+mod rig_page;
 mod said_once;
 mod section_view;
 mod sequence;

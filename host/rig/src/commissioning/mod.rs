@@ -50,7 +50,8 @@ pub struct Commissioning {
     /// Readings at the beginning of the step, and the newest.
     first: Option<Readings>,
     newest: Option<Readings>,
-    stop: StopSeen,
+    /// Of the stop input since the step began; `None`: nothing yet.
+    stop: Option<StopSeen>,
     /// Smallest and largest angle of each joint in the last step, rad.
     reached: [[f32; 2]; MAX_JOINTS],
 }
@@ -79,7 +80,7 @@ impl Commissioning {
             at: 0,
             first: None,
             newest: None,
-            stop: StopSeen::Closed,
+            stop: None,
             reached: NOTHING_REACHED,
         }
     }
@@ -169,33 +170,31 @@ impl Commissioning {
     }
 
     fn see_stop(&mut self, open: bool) {
-        let begins = self.first == self.newest;
-        self.stop = match (self.stop, open) {
-            (StopSeen::Closed, true) if begins => StopSeen::OpenFromStart,
-            (StopSeen::Closed, true) => StopSeen::Opened,
+        let seen = match (self.stop, open) {
+            (None, true) => StopSeen::OpenFromStart,
+            (Some(StopSeen::Opened), false) => return self.finish(Outcome::Passed(words::stop_works())),
             // Released: from here on as if it had been closed.
-            (StopSeen::OpenFromStart, false) => StopSeen::Closed,
-            (StopSeen::Opened, false) => {
-                self.finish(Outcome::Passed(words::stop_works()));
-                return;
-            }
-            (seen, _) => seen,
+            (None | Some(_), false) => StopSeen::Closed,
+            (Some(StopSeen::Closed), true) => StopSeen::Opened,
+            (Some(seen), true) => seen,
         };
-        if self.stop == StopSeen::OpenFromStart {
-            self.set(Outcome::Failed(words::stop_is_open()));
-        } else if self.stop == StopSeen::Opened || self.outcome().words() == words::stop_is_open() {
-            self.set(Outcome::Open);
+        if self.stop != Some(seen) {
+            self.set(match seen {
+                StopSeen::OpenFromStart => Outcome::Failed(words::stop_is_open()),
+                StopSeen::Closed | StopSeen::Opened => Outcome::Open,
+            });
         }
+        self.stop = Some(seen);
     }
 
     /// The operator has done what the step asks for: judges the encoder, the stop input or the workspace.
     pub fn done(&mut self) {
         match self.step() {
             Some(Step::Encoder(joint)) => self.judge_encoder(joint),
-            Some(Step::StopInput) if self.stop == StopSeen::Closed => {
+            Some(Step::StopInput) if self.stop == Some(StopSeen::Closed) => {
                 self.set(Outcome::Failed(words::stop_never_opened()));
             }
-            Some(Step::StopInput) if self.stop == StopSeen::Opened => {
+            Some(Step::StopInput) if self.stop == Some(StopSeen::Opened) => {
                 self.set(Outcome::Failed(words::stop_stays_open()));
             }
             Some(Step::Workspace) => self.judge_workspace(),
@@ -291,7 +290,7 @@ impl Commissioning {
         }
     }
 
-    /// Tries the present step from its beginning, with the readings that come next.
+    /// Tries the present step from its beginning.
     pub fn again(&mut self) {
         self.set(Outcome::Open);
         self.begin();
@@ -333,6 +332,10 @@ impl Commissioning {
     }
 
     fn finish(&mut self, outcome: Outcome) {
+        // After these the encoders count from another place.
+        if matches!(self.step(), Some(Step::Send | Step::Reference)) {
+            self.newest = None;
+        }
         self.set(outcome);
         self.at += 1;
         if let Some(entry) = self.entries.get_mut(self.at) {
@@ -342,8 +345,8 @@ impl Commissioning {
     }
 
     fn begin(&mut self) {
-        self.first = None;
-        self.stop = StopSeen::Closed;
+        self.first = self.newest;
+        self.stop = None;
         self.reached = NOTHING_REACHED;
     }
 }

@@ -5,8 +5,6 @@ use mortise_protocol::limits::{MAX_JOINTS, MAX_KEYFRAMES};
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_protocol::rig::Rig;
 
-use super::Commissioning;
-
 /// Angle by which it turns a joint, rad: more than a step needs.
 const TURN: f32 = 0.2;
 /// Share of its range that it moves a joint over, to either side.
@@ -65,18 +63,20 @@ pub fn lead(rig: &Rig, poses: &[[f32; MAX_JOINTS]]) -> Option<HandScript> {
     })
 }
 
-/// A hand that turns a joint forward from where it is.
-pub fn turn(steps: &Commissioning, joint: u8) -> Option<HandScript> {
-    let homes = homes(steps.in_use());
-    let mut angles: [f32; MAX_JOINTS] =
-        std::array::from_fn(|joint| steps.angle(joint).unwrap_or(homes[joint]));
-    *angles.get_mut(usize::from(joint))? += TURN;
-    lead(steps.in_use(), &[angles])
+/// Ticks after which the hand of [`turn`] rests in the reference pose, before it turns the joint.
+pub const READY: u32 = 2 * STRIDE - 100;
+
+/// A hand that brings the mechanism to its reference pose and then turns a joint forward. It knows the true mechanism, whatever its encoders say.
+pub fn turn(rig: &Rig, joint: u8) -> Option<HandScript> {
+    let home = homes(rig);
+    let mut turned = home;
+    *turned.get_mut(usize::from(joint))? += TURN;
+    // It rests between the first two poses.
+    lead(rig, &[home, home, turned])
 }
 
 /// A hand that leads every joint to both of its ends.
-pub fn reach(steps: &Commissioning) -> Option<HandScript> {
-    let rig = steps.in_use();
+pub fn reach(rig: &Rig) -> Option<HandScript> {
     let home = homes(rig);
     let mut poses = Vec::new();
     for (number, joint) in rig.joints.iter().enumerate() {

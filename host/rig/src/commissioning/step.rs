@@ -39,6 +39,16 @@ impl Outcome {
         }
     }
 
+    /// What it is, in a word.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Open => "open",
+            Self::Passed(_) => "passed",
+            Self::Corrected(_) => "corrected",
+            Self::Failed(_) => "failed",
+        }
+    }
+
     /// Whether the next step may follow.
     pub fn is_done(&self) -> bool {
         matches!(self, Self::Passed(_) | Self::Corrected(_))

@@ -106,6 +106,7 @@ impl Bench {
                 }
                 self.turn_to(from);
                 self.see();
+                self.commissioning.again();
                 self.turn_to(to);
                 self.see();
                 self.commissioning.done();
