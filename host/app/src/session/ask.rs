@@ -10,6 +10,7 @@ use super::intent::{Intent, Traces};
 use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
 use super::rig_page::RigIntent;
+use super::run::RunIntent;
 use super::state::Session;
 use super::threads::spawn;
 
@@ -19,6 +20,8 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
         Purpose::OpenModel => Intent::Open(path),
         Purpose::SaveProject => Intent::WriteProject { path, replace },
         Purpose::SaveTraces => Intent::SaveTraces { path, replace },
+        Purpose::OpenRun => Intent::Run(RunIntent::Open(path)),
+        Purpose::CompareRun => Intent::Run(RunIntent::Compare(path)),
         Purpose::OpenRig => Intent::Rig(RigIntent::Load(path)),
         Purpose::SaveRig => Intent::Rig(RigIntent::Write { path, replace }),
         Purpose::SaveRigReport => Intent::Rig(RigIntent::WriteReport { path, replace }),
@@ -68,7 +71,7 @@ impl Session {
             .filter_map(|key| Signal::named(key))
             .collect();
         let [from_s, to_s] = traces.range_s;
-        self.table = Some(csv(&self.history, &signals, from_s, to_s));
+        self.table = Some(csv(self.shown_history(), &signals, from_s, to_s));
         self.ask_for_path(Purpose::SaveTraces);
     }
 

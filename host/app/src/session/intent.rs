@@ -16,6 +16,7 @@ use super::finding::NO_FIT;
 use super::link::Link;
 use super::moves::Motion;
 use super::rig_page::RigIntent;
+use super::run::RunIntent;
 use super::state::Session;
 
 /// An action that the operator requests.
@@ -153,6 +154,8 @@ pub enum Intent {
     Record,
     /// End the recording.
     EndRecording,
+    /// An action on recorded runs.
+    Run(RunIntent),
     /// An action on the page on the rig.
     Rig(RigIntent),
     /// Let the simulated hand insert the peg into the hole.
@@ -194,6 +197,7 @@ impl Intent {
                 | Self::CancelInstruction
                 | Self::Record
                 | Self::EndRecording
+                | Self::Run(_)
                 | Self::Rig(RigIntent::Show(_))
                 | Self::Demo(_)
         )
@@ -289,6 +293,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(DeviceState::Active) => None,
             Some(_) => no("No part is held"),
         },
+        Intent::ResetScene if session.replays() => no("A recorded run is shown: close it first"),
         Intent::ResetScene => match session.device() {
             // Without a board the parts are where the window has them.
             None if session
@@ -330,7 +335,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         }
         Intent::ExportTraces(traces) if traces.keys.is_empty() => no("No signal is chosen"),
         Intent::ExportTraces(_) => session
-            .history
+            .shown_history()
             .is_empty()
             .then(|| "Nothing was recorded yet: connect a rig".to_owned()),
         Intent::SaveTraces { .. } => session
@@ -342,6 +347,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             (session.instructions.under_way().is_none()).then(|| "No instruction is under way".to_owned())
         }
         Intent::Record | Intent::EndRecording => record(session, intent),
+        Intent::Run(intent) => session.no_run_action(intent),
         Intent::Rig(intent) => session.no_rig_action(intent),
         Intent::PlayInsertion => play(session),
     }

@@ -16,6 +16,7 @@ use super::fitting::FitsFound;
 use super::introduction::RigSent;
 use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
+use super::run::RunRead;
 use super::saved::Saved;
 use super::sequencing::SequenceFound;
 use super::tap::Tap;
@@ -93,6 +94,8 @@ pub enum Update {
         /// The project, or one line with the reason of the failure.
         result: Result<ProjectFile, String>,
     },
+    /// Reading a recorded run ended.
+    Run(RunRead),
     /// A file was written, or one line with the reason why not.
     Written(Result<String, String>),
 }

@@ -123,6 +123,7 @@ impl Session {
             Intent::CancelInstruction => self.cancel_instruction(),
             Intent::Record => self.begin_recording(),
             Intent::EndRecording => self.end_recording(),
+            Intent::Run(intent) => self.perform_on_run(intent),
             Intent::Rig(intent) => self.perform_on_rig(intent),
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
             Intent::Demo(rig) => self.demo(rig),
@@ -192,6 +193,8 @@ impl Session {
     }
 
     fn connect(&mut self) {
+        // With a rig, the parts are where it has them.
+        self.close_run();
         self.link_id += 1;
         self.link = link::connect(&self.outbox, self.link_id, self.chosen.clone());
     }

@@ -9,6 +9,10 @@ pub enum Purpose {
     SaveTraces,
     /// The file for a project.
     SaveProject,
+    /// A recorded run to show.
+    OpenRun,
+    /// A recorded run to compare with.
+    CompareRun,
     /// The description of a rig to open.
     OpenRig,
     /// The file for the description of a rig.
@@ -24,6 +28,8 @@ impl Purpose {
             Self::OpenModel => "Open STEP file or project",
             Self::SaveProject => "Save project as",
             Self::SaveTraces => "Export traces as CSV",
+            Self::OpenRun => "Open recorded run",
+            Self::CompareRun => "Compare with recorded run",
             Self::OpenRig => "Open description of a rig",
             Self::SaveRig => "Save description of the rig as",
             Self::SaveRigReport => "Save report of commissioning as",
@@ -32,7 +38,10 @@ impl Purpose {
 
     /// Whether the file is written.
     pub fn is_saved(self) -> bool {
-        !matches!(self, Self::OpenModel | Self::OpenRig)
+        !matches!(
+            self,
+            Self::OpenModel | Self::OpenRig | Self::OpenRun | Self::CompareRun
+        )
     }
 
     /// An example of a path.
@@ -43,13 +52,14 @@ impl Purpose {
             Self::SaveProject => "/folder/assembly.mortise",
             Self::OpenRig | Self::SaveRig => "/folder/rig.toml",
             Self::SaveRigReport => "/folder/commissioning.md",
+            Self::OpenRun | Self::CompareRun => "/folder/run-1.mcap",
         }
     }
 
     /// Suggested name of a new file.
     pub fn file_name(self) -> &'static str {
         match self {
-            Self::OpenModel | Self::OpenRig => "",
+            Self::OpenModel | Self::OpenRig | Self::OpenRun | Self::CompareRun => "",
             Self::SaveRig => "rig.toml",
             Self::SaveRigReport => "commissioning.md",
             Self::SaveTraces => "traces.csv",
@@ -68,6 +78,7 @@ impl Purpose {
             Self::SaveProject => ("Mortise projects", &["mortise"]),
             Self::OpenRig | Self::SaveRig => ("Descriptions of rigs", &["toml"]),
             Self::SaveRigReport => ("Markdown", &["md"]),
+            Self::OpenRun | Self::CompareRun => ("Recordings", &["mcap"]),
         }
     }
 }

@@ -28,6 +28,7 @@ use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
 use super::recording::Recording;
 use super::rig_page::RigPage;
+use super::run::Playback;
 use super::sequencing::Sequencing;
 use super::threads::Cancel;
 use super::tour::Tour;
@@ -112,6 +113,11 @@ pub struct Session {
     pub sequencing: Sequencing,
     /// The part with which fits are found; `None`: the nearest ones.
     pub partner: Option<usize>,
+    /// A recorded run that is shown.
+    pub playback: Option<Playback>,
+    /// Poses of the parts before it was shown, and when it was last let go on.
+    pub(super) before_run: Option<Vec<DAffine3>>,
+    pub(super) played: Option<Instant>,
     /// The page on the rig.
     pub rig_page: RigPage,
     /// Messages.
@@ -184,6 +190,9 @@ impl Session {
             partner: None,
             ways: Ways::default(),
             rig_page: RigPage::default(),
+            playback: None,
+            before_run: None,
+            played: None,
             notes: Notes::default(),
             method: Method::default(),
             recording: None,
@@ -236,6 +245,11 @@ impl Session {
     /// The board's state, once connected.
     pub fn device(&self) -> Option<DeviceState> {
         self.connection().map(|c| c.state)
+    }
+
+    /// The samples that the plots show: of a recorded run, or of the connected rig.
+    pub fn shown_history(&self) -> &History {
+        (self.playback.as_ref()).map_or(&self.history, |playback| &playback.run.history)
     }
 
     /// Whether the motors may exert force.

@@ -89,6 +89,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         Update::Missing(missing) => session.missing = missing,
         Update::Marked { models, mark } => session.marked(models, mark),
         Update::ProjectRead { path, result } => session.project_read(path, result),
+        Update::Run(read) => session.run_read(read),
         Update::Written(Ok(done)) => session.notes.add(Severity::Good, done),
         Update::Written(Err(why)) => session.notes.add(Severity::Error, why),
     }
@@ -119,6 +120,8 @@ fn opened(session: &mut Session, Imported { document, saved }: Imported) {
     }
     session.selected = None;
     session.drop_fits();
+    session.playback = None;
+    session.before_run = None;
     session.sequencing.cancel();
     session.ways.clear();
     session.partner = None;

@@ -28,6 +28,7 @@ mod nudge;
 mod open;
 mod parameters;
 mod parts;
+mod playback;
 pub mod plots;
 mod recent;
 mod rig;
@@ -41,9 +42,7 @@ pub mod theme;
 mod undo;
 mod view;
 
-use std::time::Duration;
-#[cfg(unix)]
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use egui::{Key, Modifiers, Ui};
 
@@ -115,6 +114,9 @@ impl Window {
         self.session.poll();
         self.view.begin();
         self.clearances.poll();
+        if self.session.play(Instant::now()) {
+            ui.ctx().request_repaint();
+        }
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
         let stops = wanted.contains(&Intent::Stop);

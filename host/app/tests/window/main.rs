@@ -17,6 +17,7 @@ mod link_loss;
 mod measure;
 mod moving;
 mod picture;
+mod playback;
 mod plots;
 mod project;
 mod recording;

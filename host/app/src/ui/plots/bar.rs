@@ -6,6 +6,7 @@ use super::scale;
 use super::view::View;
 use crate::session::history::Quantity;
 use crate::session::intent::Traces;
+use crate::session::run::RunIntent;
 use crate::session::{Intent, Session};
 use crate::ui::{control, theme};
 
@@ -42,6 +43,9 @@ pub fn show(ui: &mut Ui, session: &Session, view: &mut View, wanted: &mut Vec<In
         let hint = "Write what is shown to a file of comma-separated values";
         control::intent_button(ui, session, wanted, small("Export…"), Intent::ExportTraces(traces), hint);
         record(ui, session, wanted);
+        let hint = "Show a recorded run: its traces, and the parts as they moved";
+        let open = Intent::Run(RunIntent::Browse);
+        control::intent_button(ui, session, wanted, small("Open run…"), open, hint);
         if let Some(at) = view.pointed_s() {
             let text = format!("at {:.3} s", at - view.newest_s()).replace('-', "−");
             let label = RichText::new(text).size(12.0).monospace();

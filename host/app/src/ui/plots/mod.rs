@@ -10,6 +10,7 @@ use egui::{ScrollArea, Ui, Vec2};
 pub use self::view::View;
 use crate::session::history::{Quantity, Signal};
 use crate::session::{Intent, Session};
+use crate::ui::playback;
 
 /// Smallest width at which a plot beside others can be read, points.
 const LEAST_WIDTH: f32 = 150.0;
@@ -20,9 +21,13 @@ const SPACE: Vec2 = Vec2::new(26.0, 6.0);
 
 /// Draws the bar and a plot for each quantity that has chosen signals, side by side where there is space.
 pub fn show(ui: &mut Ui, session: &Session, view: &mut View, wanted: &mut Vec<Intent>) {
-    let ends = session.history.oldest().zip(session.history.newest());
+    let history = session.shown_history();
+    let run = session.playback.as_ref();
+    view.show_run(run.map(|playback| [playback.run.duration_s(), playback.at_s]));
+    let ends = history.oldest().zip(history.newest());
     view.follow(ends.map(|(oldest, newest)| [oldest.time_s, newest.time_s]));
     bar::show(ui, session, view, wanted);
+    playback::show(ui, session, wanted);
     let panels: Vec<(Quantity, Vec<&Signal>)> = (Quantity::ALL.iter())
         .map(|&quantity| (quantity, view.chosen_of(quantity)))
         .filter(|(_, signals)| !signals.is_empty())

@@ -19,6 +19,8 @@ struct Trace {
     signal: &'static Signal,
     color: Color32,
     lines: Vec<Line>,
+    /// The same of a run to compare with, at the times of the run that is shown.
+    compared: Vec<Line>,
 }
 
 /// Draws the plot in the space there is. `pointed` becomes the time under the pointer.
@@ -41,7 +43,8 @@ pub fn show(
         .map(|signal| Trace {
             signal,
             color: color(ui, signal),
-            lines: envelope(&session.history, signal, from, to, columns),
+            lines: envelope(session.shown_history(), signal, from, to, columns),
+            compared: compared(session, signal, [from, to], columns),
         })
         .collect();
     heading(ui, session, view, (quantity, unit, factor), &traces);
@@ -49,6 +52,22 @@ pub fn show(
         .map(|c| factor * f64::from(c.capabilities.cost_budget))
         .filter(|&budget| budget > 0.0);
     plot(ui, view, quantity, traces, factor, budget, pointed);
+}
+
+/// The lines of a run to compare with, aligned by the first touch.
+fn compared(session: &Session, signal: &Signal, [from, to]: [f64; 2], columns: usize) -> Vec<Line> {
+    let Some(playback) = &session.playback else {
+        return Vec::new();
+    };
+    let Some(other) = &playback.compared else {
+        return Vec::new();
+    };
+    let shift = playback.shift_s();
+    let mut lines = envelope(&other.history, signal, from - shift, to - shift, columns);
+    for [time, _] in lines.iter_mut().flatten() {
+        *time += shift;
+    }
+    lines
 }
 
 /// Draws title, unit, and the name and value of each signal.
@@ -59,12 +78,12 @@ fn heading(
     (quantity, unit, factor): (Quantity, &str, f64),
     traces: &[Trace],
 ) {
-    let sample = match view.pointed_s() {
-        Some(at) => session.history.at(at),
-        None if view.is_held() => session.history.at(view.range_s()[1]),
+    let sample = match view.pointed_s().or(view.mark_s()) {
+        Some(at) => session.shown_history().at(at),
+        None if view.is_held() => session.shown_history().at(view.range_s()[1]),
         // An old value would look like a live one.
         None => session
-            .history
+            .shown_history()
             .newest()
             .filter(|_| session.connection().is_some()),
     };
@@ -144,13 +163,15 @@ fn plot(
     pointed: &mut Option<f64>,
 ) {
     let ([from, to], zero) = (view.range_s(), view.newest_s());
-    let values = (traces.iter().flat_map(|trace| trace.lines.iter().flatten()))
-        .filter(|[time, _]| (from..=to).contains(time))
-        .map(|&[_, value]| factor * value)
-        .fold(None, |all: Option<[f64; 2]>, v| {
-            let [low, high] = all.unwrap_or([v; 2]);
-            Some([low.min(v), high.max(v)])
-        });
+    let values = (traces
+        .iter()
+        .flat_map(|trace| trace.lines.iter().chain(&trace.compared).flatten()))
+    .filter(|[time, _]| (from..=to).contains(time))
+    .map(|&[_, value]| factor * value)
+    .fold(None, |all: Option<[f64; 2]>, v| {
+        let [low, high] = all.unwrap_or([v; 2]);
+        Some([low.min(v), high.max(v)])
+    });
     let mut scale = Scale::of(quantity, values);
     // The budget line is shown once the trace exceeds a quarter of it.
     let budget = budget.filter(|budget| values.is_some_and(|[_, high]| high > 0.25 * budget));
@@ -167,7 +188,8 @@ fn plot(
     let (start, end) = (from - zero, to - zero);
     let ink = theme::of(ui);
     let (line, cursor) = (ink.line, ink.text_weak);
-    let pointed_s = view.pointed_s();
+    let (pointed_s, mark_s) = (view.pointed_s(), view.mark_s());
+    let mark_color = ink.text_strong;
     let response = Plot::new(quantity.name())
         .height(ui.available_height())
         .show_background(false)
@@ -202,6 +224,15 @@ fn plot(
                 plot.hline(HLine::new("budget", budget).color(theme::STOP).width(1.0));
             }
             for trace in traces {
+                for points in trace.compared {
+                    let points: PlotPoints<'_> = points
+                        .into_iter()
+                        .map(|[time, value]| [time - zero, factor * value])
+                        .collect();
+                    let drawn = egui_plot::Line::new(format!("{}, compared", trace.signal.name), points);
+                    let style = egui_plot::LineStyle::dashed_dense();
+                    plot.line(drawn.color(trace.color).style(style).width(1.2));
+                }
                 for points in trace.lines {
                     let points: PlotPoints<'_> = points
                         .into_iter()
@@ -210,6 +241,9 @@ fn plot(
                     let drawn = egui_plot::Line::new(trace.signal.name, points);
                     plot.line(drawn.color(trace.color).width(1.6));
                 }
+            }
+            if let Some(at) = mark_s {
+                plot.vline(VLine::new("run", at - zero).color(mark_color).width(1.0));
             }
             if let Some(at) = pointed_s {
                 plot.vline(VLine::new("pointer", at - zero).color(cursor).width(1.0));

@@ -28,6 +28,8 @@ pub struct View {
     oldest_s: f64,
     newest_s: f64,
     pointed_s: Option<f64>,
+    /// Length of the recorded run that is shown, and the present time in it, s.
+    run_s: Option<[f64; 2]>,
 }
 
 impl Default for View {
@@ -39,6 +41,7 @@ impl Default for View {
             oldest_s: 0.0,
             newest_s: 0.0,
             pointed_s: None,
+            run_s: None,
         };
         view.choose(CHOSEN);
         view
@@ -46,6 +49,24 @@ impl Default for View {
 }
 
 impl View {
+    /// Shows all of a recorded run when it is opened, and the newest samples when it is closed.
+    pub(super) fn show_run(&mut self, run_s: Option<[f64; 2]>) {
+        let length = |run: Option<[f64; 2]>| run.map(|[duration, _]| duration);
+        let before = std::mem::replace(&mut self.run_s, run_s);
+        if length(before) == length(run_s) {
+            return;
+        }
+        self.reset();
+        if let Some(duration) = length(run_s) {
+            self.span_s = duration.clamp(*SPANS_S.start(), *SPANS_S.end());
+        }
+    }
+
+    /// The present time in the recorded run that is shown, s.
+    pub(super) fn mark_s(&self) -> Option<f64> {
+        self.run_s.map(|[_, at]| at)
+    }
+
     /// Takes the times of the oldest and the newest sample, s.
     pub(super) fn follow(&mut self, ends_s: Option<[f64; 2]>) {
         [self.oldest_s, self.newest_s] = ends_s.unwrap_or_default();

@@ -1,0 +1,296 @@
+//! A recorded run as the window shows it: its traces, where its handle and part were, and its figures. Pure but for reading the file.
+
+use std::path::{Path, PathBuf};
+
+use mortise_protocol::message::{FromDevice, Telemetry, ToDevice, WirePose};
+use mortise_record::{EntryKind, Recording};
+
+use super::history::{History, Sample};
+
+/// Contact force from which parts touch, N.
+const TOUCH_N: f32 = 0.05;
+
+/// Where things were at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Time since the run's beginning, s.
+    pub time_s: f64,
+    /// The handle.
+    pub handle: WirePose,
+    /// The held part, by its number in the collision model, and its pose.
+    pub object: Option<(u16, WirePose)>,
+}
+
+/// Figures of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figures {
+    /// Time from the first touch to the deepest insertion, s; 0 without a touch.
+    pub insertion_s: f64,
+    /// Largest contact force, N.
+    pub contact_n: f32,
+    /// Largest force on the handle, N.
+    pub handle_n: f32,
+    /// Deepest penetration, µm.
+    pub depth_um: f32,
+    /// Deepest insertion, mm.
+    pub insertion_mm: f32,
+}
+
+/// A recorded run.
+#[derive(Clone, Debug, Default)]
+pub struct Run {
+    /// The file.
+    pub path: PathBuf,
+    /// Its samples; of a longer one the last minutes.
+    pub history: History,
+    frames: Vec<Frame>,
+    /// Checksums of the collision models that were on the board.
+    pub scenes: Vec<u32>,
+    /// Time of the first touch, s.
+    pub touch_s: Option<f64>,
+    /// Its figures.
+    pub figures: Figures,
+}
+
+impl Run {
+    /// Reads a recording. Cost: some seconds for an hour.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let recording = Recording::open(path).map_err(|error| error.to_string())?;
+        let mut run = Self {
+            path: path.to_owned(),
+            ..Self::default()
+        };
+        let mut tick_hz = 1_000;
+        let mut start = None;
+        for entry in recording.entries() {
+            match entry.kind {
+                EntryKind::Telemetry(sample) => run.add(&sample, tick_hz, &mut start),
+                EntryKind::Received(FromDevice::Capabilities(can)) => {
+                    tick_hz = can.tick_hz.max(1);
+                    run.scenes.extend(can.scene);
+                }
+                EntryKind::Sent(_, ToDevice::SceneBegin { crc, .. }) => run.scenes.push(crc),
+                _ => {}
+            }
+        }
+        match run.frames.is_empty() {
+            true => Err(format!(
+                "{}: holds no telemetry, so nothing can be shown",
+                path.display()
+            )),
+            false => Ok(run),
+        }
+    }
+
+    fn add(&mut self, telemetry: &Telemetry, tick_hz: u16, start: &mut Option<f64>) {
+        let mut sample = Sample::of(telemetry, tick_hz);
+        sample.time_s -= *start.get_or_insert(sample.time_s);
+        self.history.add(sample);
+        // The history's time goes on where the board started again.
+        let time_s = self.history.newest().map_or(0.0, |newest| newest.time_s);
+        self.frames.push(Frame {
+            time_s,
+            handle: telemetry.handle,
+            object: telemetry.object,
+        });
+        if sample.contact_n > TOUCH_N && self.touch_s.is_none() {
+            self.touch_s = Some(time_s);
+        }
+        let figures = &mut self.figures;
+        figures.contact_n = figures.contact_n.max(sample.contact_n);
+        figures.handle_n = figures.handle_n.max(sample.handle_n);
+        figures.depth_um = figures.depth_um.max(sample.depth_um);
+        if sample.insertion_mm > figures.insertion_mm {
+            figures.insertion_mm = sample.insertion_mm;
+            figures.insertion_s = self.touch_s.map_or(0.0, |touch| time_s - touch);
+        }
+    }
+
+    /// Length, s.
+    pub fn duration_s(&self) -> f64 {
+        self.frames.last().map_or(0.0, |frame| frame.time_s)
+    }
+
+    /// The last frame not later than a time, s; the first one before it.
+    pub fn at(&self, time_s: f64) -> Option<&Frame> {
+        let after = self.frames.partition_point(|frame| frame.time_s <= time_s);
+        self.frames.get(after.saturating_sub(1))
+    }
+
+    /// Name of the file.
+    pub fn name(&self) -> String {
+        let name = self.path.file_name().unwrap_or(self.path.as_os_str());
+        name.to_string_lossy().into_owned()
+    }
+}
+
+/// An action of the operator on recorded runs.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RunIntent {
+    /// Ask for the file of a run to show.
+    Browse,
+    /// Show a run.
+    Open(PathBuf),
+    /// Ask for the file of a run to compare with.
+    BrowseOther,
+    /// Compare with a run.
+    Compare(PathBuf),
+    /// Let it go on, or hold it.
+    Play(bool),
+    /// Go to a time, s.
+    GoTo(f64),
+    /// Seconds of the run in a second.
+    Speed(f64),
+    /// Show no run any more.
+    Close,
+}
+
+/// A run that was read.
+pub struct RunRead {
+    /// Whether it is to be compared with the run that is shown.
+    pub compare: bool,
+    /// The run, or one line with the reason why there is none.
+    pub result: Result<Box<Run>, String>,
+}
+
+/// A run that is shown, and where it is.
+#[derive(Clone, Debug)]
+pub struct Playback {
+    /// The run.
+    pub run: Run,
+    /// Another run, to compare with.
+    pub compared: Option<Run>,
+    /// Present time in the run, s.
+    pub at_s: f64,
+    /// Whether it goes on by itself.
+    pub plays: bool,
+    /// Seconds of the run in a second.
+    pub speed: f64,
+    /// Whether the open document has the collision model of the run, so that its parts are moved.
+    pub moves_parts: bool,
+}
+
+impl Playback {
+    /// A run from its beginning.
+    pub fn new(run: Run, moves_parts: bool) -> Self {
+        Self {
+            run,
+            compared: None,
+            at_s: 0.0,
+            plays: false,
+            speed: 1.0,
+            moves_parts,
+        }
+    }
+
+    /// Goes to a time, s, within the run.
+    pub fn go_to(&mut self, time_s: f64) {
+        let time_s = if time_s.is_finite() { time_s } else { 0.0 };
+        self.at_s = time_s.clamp(0.0, self.run.duration_s());
+    }
+
+    /// Time has passed, s; stops at the end.
+    pub fn pass(&mut self, seconds: f64) {
+        if self.plays {
+            self.go_to(self.at_s + seconds * self.speed);
+            self.plays = self.at_s < self.run.duration_s();
+        }
+    }
+
+    /// Added to times of the compared run so that both touch first at the same time, s; without a touch they begin together.
+    pub fn shift_s(&self) -> f64 {
+        let touches = self.compared.as_ref().and_then(|run| run.touch_s);
+        self.run
+            .touch_s
+            .zip(touches)
+            .map_or(0.0, |(own, other)| own - other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(tick: u32, contact: f32) -> Telemetry {
+        let pose = WirePose {
+            position: [0.0, 0.0, tick as f32 * 1e-3],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+        };
+        Telemetry {
+            tick,
+            handle: pose,
+            object: Some((1, pose)),
+            wrench: Default::default(),
+            contact: mortise_protocol::message::WireWrench {
+                force: [contact, 0.0, 0.0],
+                torque: [0.0; 3],
+            },
+            hand: None,
+            cost: 0,
+            points: 0,
+            flags: 0,
+            missed: 0,
+            dropped: 0,
+            guidance: Default::default(),
+            pairs: Default::default(),
+        }
+    }
+
+    fn run(first: u32, touch: u32) -> Run {
+        let mut run = Run::default();
+        let mut start = None;
+        for step in 0..200 {
+            let contact = if step >= touch { 2.0 } else { 0.0 };
+            run.add(&sample(first + 10 * step, contact), 1_000, &mut start);
+        }
+        run
+    }
+
+    #[test]
+    fn runs_are_aligned_by_their_first_touch() {
+        let (own, other) = (run(5_000, 80), run(90_000, 30));
+        assert!((own.touch_s.expect("touches") - 0.8).abs() < 1e-9);
+        assert!((own.duration_s() - 1.99).abs() < 1e-9);
+        assert_eq!(own.figures.contact_n, 2.0);
+        let mut playback = Playback::new(own, true);
+        playback.compared = Some(other);
+        assert!((playback.shift_s() - 0.5).abs() < 1e-9);
+        playback.compared = Some(run(0, 1_000));
+        assert_eq!(playback.shift_s(), 0.0, "it never touches");
+    }
+
+    #[test]
+    fn a_frame_is_the_last_one_before_its_time_and_play_stops_at_the_end() {
+        let mut playback = Playback::new(run(5_000, 80), true);
+        let at = |playback: &Playback| playback.run.at(playback.at_s).expect("a frame").time_s;
+        for (time, expected) in [
+            (-1.0, 0.0),
+            (0.0, 0.0),
+            (0.014, 0.01),
+            (9.0, 1.99),
+            (f64::NAN, 0.0),
+        ] {
+            playback.go_to(time);
+            assert!((at(&playback) - expected).abs() < 1e-9, "{time}");
+        }
+        playback.pass(1.0);
+        assert_eq!(playback.at_s, 0.0, "it does not play");
+        (playback.plays, playback.speed) = (true, 0.5);
+        playback.pass(1.0);
+        assert!((playback.at_s - 0.5).abs() < 1e-9 && playback.plays);
+        playback.pass(100.0);
+        assert!(!playback.plays && (playback.at_s - 1.99).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_board_that_started_again_goes_on_behind_what_was() {
+        let mut run = run(5_000, 80);
+        run.add(&sample(3, 0.0), 1_000, &mut Some(5.0));
+        assert!(run.duration_s() > 1.99);
+        let times: Vec<f64> = run.frames.iter().map(|frame| frame.time_s).collect();
+        assert!(times.is_sorted());
+    }
+}
