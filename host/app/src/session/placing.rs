@@ -11,11 +11,7 @@ impl Session {
     pub(super) fn no_move(&self) -> Option<&'static str> {
         if self.is_armed() {
             Some("Only while the motors are off: disarm first")
-        } else if self
-            .playback
-            .as_ref()
-            .is_some_and(|playback| playback.moves_parts)
-        {
+        } else if self.replays() {
             Some("A recorded run is shown: close it first")
         } else {
             let uploads = self.connection().is_some_and(|c| c.upload.is_some());

@@ -252,6 +252,13 @@ impl Session {
         (self.playback.as_ref()).map_or(&self.history, |playback| &playback.run.history)
     }
 
+    /// Whether a recorded run has the parts where they are.
+    pub fn replays(&self) -> bool {
+        self.playback
+            .as_ref()
+            .is_some_and(|playback| playback.moves_parts)
+    }
+
     /// Whether the motors may exert force.
     pub fn is_armed(&self) -> bool {
         matches!(

@@ -29,7 +29,8 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         ui.spacing_mut().slider_width = (0.35 * ui.available_width()).clamp(60.0, 420.0);
         let slider = Slider::new(&mut at, 0.0..=playback.run.duration_s())
             .suffix(" s")
-            .fixed_decimals(2);
+            // A fixed number of decimals would round the time itself, as if the slider had been moved.
+            .custom_formatter(|time, _| format!("{time:.2}"));
         let slider = ui.add(slider);
         if slider.changed() {
             wanted.push(Intent::Run(RunIntent::GoTo(at)));

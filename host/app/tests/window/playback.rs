@@ -64,11 +64,8 @@ fn a_run_is_shown_scrubbed_played_compared_and_closed() {
     harness.run_steps(3);
     let playback = shown(&harness.state().session);
     assert!(playback.moves_parts, "the file that was recorded is open");
-    let (length, figures) = (playback.run.duration_s(), playback.run.figures);
-    assert!(
-        length > 2.0 && figures.insertion_mm > 5.0,
-        "{length} s, {figures:?}"
-    );
+    let length = playback.run.duration_s();
+    assert!(length > 2.0, "{length} s");
     // The slider moves the peg as it moved, and no part but that.
     let seen: Vec<f64> = [0.0, 0.5, 1.0]
         .map(|share| {
@@ -78,16 +75,17 @@ fn a_run_is_shown_scrubbed_played_compared_and_closed() {
             now[1].translation.z
         })
         .to_vec();
-    assert!(seen[0] > seen[2] + 5.0, "the peg goes down: {seen:?}");
+    assert!(
+        seen[1] > seen[2] + 5.0,
+        "the peg goes up and comes down: {seen:?}"
+    );
     // Where it was held to the end, it is where it was when the rig was disconnected.
     assert!(
         (seen[2] - before[1].translation.z).abs() < 0.5,
         "{seen:?} {before:?}"
     );
-    let moving = Intent::ResetScene;
-    assert!(
-        obstacle(&harness.state().session, &moving).is_some() || !shown(&harness.state().session).moves_parts
-    );
+    let reset = obstacle(&harness.state().session, &Intent::ResetScene);
+    assert_eq!(reset.as_deref(), Some("A recorded run is shown: close it first"));
     // It plays by itself, at the chosen speed, to the end.
     act(&mut harness, RunIntent::Speed(5.0));
     click(&mut harness, "Play the run");
