@@ -31,7 +31,10 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
 impl Session {
     /// Asks for a path by the desktop's file dialog, where there is one.
     pub(super) fn ask_for_path(&self, purpose: Purpose) {
-        let folder = self.folder();
+        let folder = match purpose {
+            Purpose::OpenRun | Purpose::CompareRun => self.recordings(),
+            _ => self.folder(),
+        };
         let dialog = move || {
             let (name, endings) = purpose.filter();
             let dialog = rfd::FileDialog::new()

@@ -140,20 +140,21 @@ impl Session {
         }
     }
 
-    /// Puts the part that was held where it was.
+    /// Puts the parts that were held where they were.
     fn show_frame(&mut self) {
         let (Some(playback), Some(document)) = (&self.playback, &mut self.document) else {
             return;
         };
-        let frame = playback.run.at(playback.at_s).filter(|_| playback.moves_parts);
-        let Some((part, pose)) = frame.and_then(|frame| frame.object) else {
+        if !playback.moves_parts {
             return;
-        };
-        if let Some(shown) = document
-            .model_part(part)
-            .and_then(|part| document.poses.get_mut(part))
-        {
-            *shown = pose::from_wire(&pose);
+        }
+        for (part, pose) in playback.run.poses(playback.at_s) {
+            if let Some(shown) = document
+                .model_part(part)
+                .and_then(|part| document.poses.get_mut(part))
+            {
+                *shown = pose::from_wire(&pose);
+            }
         }
     }
 }

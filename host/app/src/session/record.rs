@@ -19,6 +19,11 @@ fn folder() -> Result<PathBuf, String> {
 }
 
 impl Session {
+    /// Where recordings go, if there is a folder for them.
+    pub(super) fn recordings(&self) -> Option<PathBuf> {
+        self.recordings.clone().or_else(|| folder().ok())
+    }
+
     pub(super) fn begin_recording(&mut self) {
         let folder = match self.recordings.clone().map_or_else(folder, Ok) {
             Ok(folder) => folder,

@@ -1,5 +1,6 @@
 //! A recorded run as the window shows it: its traces, where its handle and part were, and its figures. Pure but for reading the file.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mortise_protocol::message::{FromDevice, Telemetry, ToDevice, WirePose};
@@ -9,17 +10,6 @@ use super::history::{History, Sample};
 
 /// Contact force from which parts touch, N.
 const TOUCH_N: f32 = 0.05;
-
-/// Where things were at one time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
-    /// Time since the run's beginning, s.
-    pub time_s: f64,
-    /// The handle.
-    pub handle: WirePose,
-    /// The held part, by its number in the collision model, and its pose.
-    pub object: Option<(u16, WirePose)>,
-}
 
 /// Figures of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,7 +33,9 @@ pub struct Run {
     pub path: PathBuf,
     /// Its samples; of a longer one the last minutes.
     pub history: History,
-    frames: Vec<Frame>,
+    /// Of each part that was held, by its number in the collision model: times, s, and poses.
+    parts: BTreeMap<u16, Vec<(f64, WirePose)>>,
+    duration_s: f64,
     /// Checksums of the collision models that were on the board.
     pub scenes: Vec<u32>,
     /// Time of the first touch, s.
@@ -76,7 +68,7 @@ impl Run {
                 _ => {}
             }
         }
-        match run.frames.is_empty() {
+        match run.history.is_empty() {
             true => Err(format!(
                 "{}: holds no telemetry, so nothing can be shown",
                 path.display()
@@ -91,11 +83,10 @@ impl Run {
         self.history.add(sample);
         // The history's time goes on where the board started again.
         let time_s = self.history.newest().map_or(0.0, |newest| newest.time_s);
-        self.frames.push(Frame {
-            time_s,
-            handle: telemetry.handle,
-            object: telemetry.object,
-        });
+        self.duration_s = time_s;
+        if let Some((part, pose)) = telemetry.object {
+            self.parts.entry(part).or_default().push((time_s, pose));
+        }
         if sample.contact_n > TOUCH_N && self.touch_s.is_none() {
             self.touch_s = Some(time_s);
         }
@@ -111,13 +102,16 @@ impl Run {
 
     /// Length, s.
     pub fn duration_s(&self) -> f64 {
-        self.frames.last().map_or(0.0, |frame| frame.time_s)
+        self.duration_s
     }
 
-    /// The last frame not later than a time, s; the first one before it.
-    pub fn at(&self, time_s: f64) -> Option<&Frame> {
-        let after = self.frames.partition_point(|frame| frame.time_s <= time_s);
-        self.frames.get(after.saturating_sub(1))
+    /// Where each part was that was ever held, by its number in the collision model: where it was held last, or before that where it was held first.
+    pub fn poses(&self, time_s: f64) -> impl Iterator<Item = (u16, WirePose)> {
+        self.parts.iter().filter_map(move |(&part, poses)| {
+            let after = poses.partition_point(|(time, _)| *time <= time_s);
+            let (_, pose) = poses.get(after.saturating_sub(1))?;
+            Some((part, *pose))
+        })
     }
 
     /// Name of the file.
@@ -263,19 +257,35 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_is_the_last_one_before_its_time_and_play_stops_at_the_end() {
-        let mut playback = Playback::new(run(5_000, 80), true);
-        let at = |playback: &Playback| playback.run.at(playback.at_s).expect("a frame").time_s;
-        for (time, expected) in [
-            (-1.0, 0.0),
-            (0.0, 0.0),
-            (0.014, 0.01),
-            (9.0, 1.99),
-            (f64::NAN, 0.0),
-        ] {
-            playback.go_to(time);
-            assert!((at(&playback) - expected).abs() < 1e-9, "{time}");
+    fn a_part_is_where_it_was_held_last_and_before_that_where_it_was_held_first() {
+        let mut run = run(5_000, 80);
+        let z = |run: &Run, part: u16, time: f64| {
+            let found = run.poses(time).find(|(known, _)| *known == part);
+            found.map(|(_, pose)| pose.position[2])
+        };
+        // Another part is held from 2 s on.
+        for step in 200..300 {
+            let mut later = sample(5_000 + 10 * step, 0.0);
+            later.object = Some((4, later.handle));
+            run.add(&later, 1_000, &mut Some(5.0));
         }
+        for (time, one, other) in [
+            (-1.0, 5.0, 7.0),
+            (0.014, 5.01, 7.0),
+            (1.0, 6.0, 7.0),
+            (2.5, 6.99, 7.5),
+            (9.0, 6.99, 7.99),
+        ] {
+            assert!((z(&run, 1, time).expect("held") - one).abs() < 1e-3, "{time}");
+            assert!((z(&run, 4, time).expect("held") - other).abs() < 1e-3, "{time}");
+        }
+        assert_eq!(z(&run, 2, 1.0), None);
+    }
+
+    #[test]
+    fn play_goes_on_at_its_speed_and_stops_at_the_end() {
+        let mut playback = Playback::new(run(5_000, 80), true);
+        playback.go_to(f64::NAN);
         playback.pass(1.0);
         assert_eq!(playback.at_s, 0.0, "it does not play");
         (playback.plays, playback.speed) = (true, 0.5);
@@ -290,7 +300,6 @@ mod tests {
         let mut run = run(5_000, 80);
         run.add(&sample(3, 0.0), 1_000, &mut Some(5.0));
         assert!(run.duration_s() > 1.99);
-        let times: Vec<f64> = run.frames.iter().map(|frame| frame.time_s).collect();
-        assert!(times.is_sorted());
+        assert!(run.parts[&1].is_sorted_by(|a, b| a.0 <= b.0));
     }
 }
