@@ -234,6 +234,7 @@ fn a_dead_encoder_a_dead_motor_and_a_broken_stop_wire_are_named() {
     assert!(obstacle(&harness.state().session, &intent).is_some());
     choose_wiring(&mut harness, "as described");
     take_until(&mut harness, |step| step == Some(Step::StopInput));
+    pause(&mut harness, 300);
     choose_wiring(&mut harness, "wire of the stop button broken");
     until(&mut harness, "the open input is seen", |s| {
         matches!(steps(s).outcome(), Outcome::Failed(_)) || s.device() != Some(DeviceState::Idle)
@@ -244,11 +245,14 @@ fn a_dead_encoder_a_dead_motor_and_a_broken_stop_wire_are_named() {
     let words = steps(&harness.state().session).outcome().words().to_owned();
     assert!(words.contains("wire is broken"), "{words}");
     choose_wiring(&mut harness, "motor 1 unplugged");
-    until(&mut harness, "closed again", |s| {
-        steps(s).step() != Some(Step::StopInput)
-    });
-    click(&mut harness, "Clear stop");
-    until(&mut harness, "cleared", |s| s.device() == Some(DeviceState::Idle));
+    pause(&mut harness, 300);
+    if steps(&harness.state().session).step() == Some(Step::StopInput) {
+        // The first reading of the step came after the wire had broken.
+        take_until(&mut harness, |step| step != Some(Step::StopInput));
+    } else {
+        click(&mut harness, "Clear stop");
+        until(&mut harness, "cleared", |s| s.device() == Some(DeviceState::Idle));
+    }
     assert_eq!(steps(&harness.state().session).step(), Some(Step::Motor(0)));
     click(&mut harness, "Test motor");
     until(&mut harness, "tested", |s| s.rig_page.busy.is_none());
