@@ -266,7 +266,7 @@ fn carry_out(
         Command::Record { folder, scene } => {
             LinkUpdate::Recording(recorded.begin(client, &folder, scene.as_deref()))
         }
-        Command::ReadRig => LinkUpdate::Rig(client.rig().map_err(|error| error.to_string())),
+        Command::ReadRig => LinkUpdate::Rig(Box::new(client.rig().map_err(|error| error.to_string()))),
         Command::SendRig(rig) => LinkUpdate::RigSent(send_rig(client, *rig).map(Box::new)),
         Command::Reference => {
             LinkUpdate::Referenced(client.request(ToDevice::Home).map_err(|error| error.to_string()))

@@ -163,7 +163,7 @@ pub enum LinkUpdate {
     /// What became of a recording.
     Recording(RecordingUpdate),
     /// The description that the board keeps, and whether it uses it; or one line with the reason why it was not read.
-    Rig(Result<(Option<Rig>, bool), String>),
+    Rig(Box<Result<(Option<Rig>, bool), String>>),
     /// A description was sent, and the board has started again; or one line with the reason why not.
     RigSent(Result<Box<RigSent>, String>),
     /// Readings of encoders and inputs.

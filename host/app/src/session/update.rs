@@ -179,7 +179,7 @@ fn link(session: &mut Session, update: LinkUpdate) {
         }
         LinkUpdate::Uploaded { generation, result } => uploaded(session, generation, result),
         LinkUpdate::Recording(update) => session.recording_update(update),
-        LinkUpdate::Rig(result) => session.rig_read(result),
+        LinkUpdate::Rig(result) => session.rig_read(*result),
         LinkUpdate::RigSent(result) => session.rig_sent(result.map(|sent| *sent)),
         LinkUpdate::Readings(readings) => session.readings(&readings),
         LinkUpdate::Referenced(result) => session.reference_set(result),
