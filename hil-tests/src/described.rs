@@ -2,19 +2,10 @@
 
 use mortise_protocol::message::{HandScript, Keyframe, Refusal, ToDevice, WirePose};
 use mortise_protocol::rig::Rig;
-use mortise_rig::{Client, Event, RigError, RigSpec, parse_rig};
+use mortise_rig::{Client, EXAMPLES, Event, RigError, RigSpec, parse_rig};
 
 use crate::verdict::Verdict;
 
-const EXAMPLES: [(&str, &str); 4] = [
-    ("hapkit", include_str!("../../firmware/rigs/hapkit.toml")),
-    ("haply_2diy", include_str!("../../firmware/rigs/haply_2diy.toml")),
-    (
-        "woodenhaptics",
-        include_str!("../../firmware/rigs/woodenhaptics.toml"),
-    ),
-    ("polhem", include_str!("../../firmware/rigs/polhem.toml")),
-];
 /// Ticks of the hand's motion, and of its rest.
 const TICKS: u32 = 400;
 

@@ -7,11 +7,10 @@ use mortise_protocol::message::{
 };
 use mortise_protocol::rig::Rig;
 use mortise_rig::commissioning::{Sense, motor_sense};
-use mortise_rig::{Client, Observer, RigError, RigSpec, parse_rig};
+use mortise_rig::{Client, EXAMPLES, Observer, RigError, RigSpec, parse_rig};
 
 use crate::verdict::Verdict;
 
-const ARM: &str = include_str!("../../firmware/rigs/woodenhaptics.toml");
 /// More ticks than a test takes.
 const TEST: u32 = 150;
 /// Ticks in which the mechanism comes to rest.
@@ -24,7 +23,8 @@ pub fn motors_are_tested_one_by_one(client: Client) -> Verdict {
     if !client.capabilities().simulated {
         return Ok("real motors are tested from the window, by the person beside them".into());
     }
-    let rig = parse_rig(ARM, "woodenhaptics").map_err(|error| error.to_string())?;
+    let (name, text) = EXAMPLES[2];
+    let rig = parse_rig(text, name).map_err(|error| error.to_string())?;
     let client = described(client, &rig)?;
     let other = Client::connect(&RigSpec::Simulated { realtime: false }).map_err(words)?;
     let other = described(other, &rig)?;

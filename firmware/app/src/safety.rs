@@ -48,7 +48,7 @@ pub enum Motors {
     Rendered,
     /// Driven with the fading last wrench and damping.
     Fading,
-    /// One motor driven with the pulse of its test, the others with zero current.
+    /// One motor driven with the push of its test, the others with zero current.
     Tested,
 }
 

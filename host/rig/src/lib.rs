@@ -47,7 +47,7 @@ mod upload;
 mod words;
 
 pub use client::{Client, LinkCounts, Ran};
-pub use description::{Abilities, DescriptionError, abilities, load_rig, parse_rig, write_rig};
+pub use description::{Abilities, DescriptionError, EXAMPLES, abilities, load_rig, parse_rig, write_rig};
 pub use emulator::{
     FIRMWARE_VARIABLE, QEMU_VARIABLE, SERIAL_VARIABLE, emulate, emulator_available, firmware_path,
 };

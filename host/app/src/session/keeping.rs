@@ -114,6 +114,10 @@ impl Session {
 
     /// Notes what was done with the open document: before another replaces it, and when it is to be saved.
     pub(super) fn note_project(&mut self) {
+        // It was noted before the recorded run that moves its parts now.
+        if self.replays() {
+            return;
+        }
         let document = self.document.as_ref().filter(|d| !d.sha256.is_empty());
         let (Some(document), Some(_)) = (document, &self.keeper.folder) else {
             return;

@@ -201,6 +201,10 @@ impl Session {
             self.take_back();
             return;
         }
+        // A recorded run moves parts for a while only.
+        if self.replays() {
+            return;
+        }
         let Some(document) = &self.document else { return };
         let moves = &mut self.moves;
         if moves.generation != Some(document.generation) {

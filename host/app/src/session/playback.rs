@@ -90,6 +90,7 @@ impl Session {
             return;
         }
         self.close_run();
+        self.note_project();
         let moves_parts = self.has_scene_of(&run);
         let name = run.name();
         self.notes.add(

@@ -9,20 +9,6 @@ use mortise_rig::{Abilities, abilities, parse_rig, write_rig};
 
 use super::readings::ReadingsWatch;
 
-/// Examples of descriptions, to begin with: name and text.
-pub const EXAMPLES: [(&str, &str); 4] = [
-    ("hapkit", include_str!("../../../../firmware/rigs/hapkit.toml")),
-    (
-        "haply_2diy",
-        include_str!("../../../../firmware/rigs/haply_2diy.toml"),
-    ),
-    (
-        "woodenhaptics",
-        include_str!("../../../../firmware/rigs/woodenhaptics.toml"),
-    ),
-    ("polhem", include_str!("../../../../firmware/rigs/polhem.toml")),
-];
-
 /// Time that the traces of the encoders keep, s.
 pub const TRACE_S: f64 = 10.0;
 
@@ -171,8 +157,6 @@ pub struct RigPage {
     /// What the window shows in its middle.
     pub workspace: Workspace,
     text: String,
-    /// Where the text comes from.
-    pub origin: String,
     checked: Option<Result<Box<Checked>, String>>,
     /// The description that the board keeps, and whether it uses it; `None`: not read yet.
     pub on_board: Option<(Option<Rig>, bool)>,
@@ -195,12 +179,6 @@ impl RigPage {
     /// The text of the description.
     pub fn text(&self) -> &str {
         &self.text
-    }
-
-    /// Replaces the text.
-    pub fn set_text(&mut self, text: String, origin: &str) {
-        origin.clone_into(&mut self.origin);
-        self.edit(text);
     }
 
     /// Changes the text.
@@ -293,11 +271,11 @@ impl RigPage {
         self.newest.as_ref()
     }
 
-    /// The board keeps this description, and whether it uses it. Commissioning goes on with it if it has the same joints.
+    /// The board keeps this description, and whether it uses it. Commissioning goes on with its own alone, with or without the corrections not yet sent.
     pub fn found(&mut self, rig: Option<Rig>, in_use: bool) {
         if let Some(steps) = &mut self.steps {
             match rig.as_ref().filter(|_| in_use) {
-                Some(rig) if rig.joints.len() == steps.rig().joints.len() => steps.sent(Ok(rig.clone())),
+                Some(rig) if rig == steps.rig() || rig == steps.in_use() => steps.sent(Ok(rig.clone())),
                 _ => self.steps = None,
             }
         }
@@ -352,13 +330,14 @@ fn check(text: &str) -> Result<Box<Checked>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mortise_rig::EXAMPLES;
 
     #[test]
     fn an_example_is_sound_and_a_damaged_one_says_where() {
         let mut page = RigPage::default();
         assert!(page.checked().is_none());
         for (name, text) in EXAMPLES {
-            page.set_text(text.to_owned(), name);
+            page.edit(text.to_owned());
             assert!(matches!(page.checked(), Some(Ok(_))), "{name}");
             page.edit(text.replace("counts_per_turn", "counts_per_turns"));
             match page.checked() {
@@ -379,6 +358,12 @@ mod tests {
         page.found(Some(rigs[2].clone()), true);
         assert!(page.steps.is_some());
         page.link_lost();
+        let mut other = rigs[2].clone();
+        other.joints[0].gear += 1.0;
+        page.found(Some(other), true);
+        assert!(page.steps.is_none(), "another description of as many joints");
+        page.found(Some(rigs[2].clone()), true);
+        page.begin();
         page.found(Some(rigs[1].clone()), true);
         assert!(page.steps.is_none(), "another mechanism");
         page.begin();
@@ -390,7 +375,7 @@ mod tests {
     fn a_text_is_in_use_when_the_board_has_the_same_numbers() {
         let mut page = RigPage::default();
         let (_, text) = EXAMPLES[2];
-        page.set_text(text.to_owned(), "an example");
+        page.edit(text.to_owned());
         let Some(Ok(checked)) = page.checked() else {
             panic!()
         };

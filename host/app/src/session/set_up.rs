@@ -5,14 +5,14 @@ use mortise_protocol::message::{
 };
 use mortise_protocol::rig::Rig;
 use mortise_rig::commissioning::{Commissioning, Step, operator};
-use mortise_rig::{load_rig, write_rig};
+use mortise_rig::{EXAMPLES, load_rig, write_rig};
 
 use super::ask::write;
 use super::introduction::RigSent;
 use super::link::Command;
 use super::notes::Severity;
 use super::purpose::Purpose;
-use super::rig_page::{EXAMPLES, RigIntent, Workspace};
+use super::rig_page::{RigIntent, Workspace};
 use super::state::Session;
 
 /// Force of a motor's test at the handle, N.
@@ -106,13 +106,13 @@ impl Session {
             RigIntent::Show(workspace) => self.show_workspace(workspace),
             RigIntent::Read => self.read_rig(),
             RigIntent::Example(number) => {
-                if let Some((name, text)) = EXAMPLES.get(number) {
-                    self.rig_page.set_text((*text).to_owned(), name);
+                if let Some((_, text)) = EXAMPLES.get(number) {
+                    self.rig_page.edit((*text).to_owned());
                 }
             }
             RigIntent::Browse => self.ask_for_path(Purpose::OpenRig),
             RigIntent::Load(path) => match std::fs::read_to_string(&path) {
-                Ok(text) => self.rig_page.set_text(text, &path.display().to_string()),
+                Ok(text) => self.rig_page.edit(text),
                 // The same words as on the command line.
                 Err(_) => {
                     if let Err(error) = load_rig(&path) {
@@ -267,7 +267,7 @@ impl Session {
         match result {
             Ok((rig, in_use)) => {
                 if let Some(rig) = &rig {
-                    self.rig_page.set_text(write_rig(rig), "the board");
+                    self.rig_page.edit(write_rig(rig));
                 }
                 self.rig_page.found(rig, in_use);
                 self.watch_readings();
@@ -279,42 +279,39 @@ impl Session {
     /// A description was sent, and the board has started again.
     pub(super) fn rig_sent(&mut self, result: Result<RigSent, String>) {
         self.rig_page.busy = None;
-        let rig = match result {
-            Ok(sent) => {
-                if let Some(connection) = self.connection_mut() {
-                    connection.state = sent.capabilities.state;
-                    connection.capabilities = sent.capabilities;
-                }
-                for (id, value) in sent.parameters {
-                    if let Some(known) = self.parameters.get_mut(id as usize) {
-                        *known = value;
-                    }
-                }
-                self.send_own_parameters();
-                self.history.interrupt();
-                self.notes.add(
-                    Severity::Good,
-                    format!(
-                        "The board has started again with the description of {}",
-                        sent.rig.name
-                    ),
-                );
-                self.rig_page.on_board = Some((Some(sent.rig.clone()), true));
-                self.watch_readings();
-                self.wire(&[]);
-                Ok(sent.rig)
-            }
+        let sent = match result {
+            Ok(sent) => sent,
             Err(why) => {
                 self.notes.add(Severity::Error, why.clone());
-                Err(why)
+                return self.with_steps(|steps| steps.sent(Err(why)));
             }
         };
-        let Some(steps) = &mut self.rig_page.steps else {
-            return;
-        };
-        steps.sent(rig);
-        let text = write_rig(steps.rig());
-        self.rig_page.set_text(text, "the board");
+        if let Some(connection) = self.connection_mut() {
+            connection.state = sent.capabilities.state;
+            connection.capabilities = sent.capabilities;
+        }
+        for (id, value) in sent.parameters {
+            if let Some(known) = self.parameters.get_mut(id as usize) {
+                *known = value;
+            }
+        }
+        self.send_own_parameters();
+        self.history.interrupt();
+        self.notes.add(
+            Severity::Good,
+            format!(
+                "The board has started again with the description of {}",
+                sent.rig.name
+            ),
+        );
+        let text = write_rig(&sent.rig);
+        self.rig_page.found(Some(sent.rig), true);
+        // What was written keeps its comments.
+        if !self.rig_page.is_in_use() {
+            self.rig_page.edit(text);
+        }
+        self.watch_readings();
+        self.wire(&[]);
     }
 
     pub(super) fn reference_set(&mut self, result: Result<(), String>) {

@@ -1,10 +1,10 @@
 //! The description of the rig as text, checked while it is written.
 
 use egui::{FontId, RichText, TextEdit, Ui, Vec2};
-use mortise_rig::Abilities;
+use mortise_rig::{Abilities, EXAMPLES};
 
 use super::{control, theme};
-use crate::session::rig_page::{EXAMPLES, RigIntent};
+use crate::session::rig_page::RigIntent;
 use crate::session::{Intent, Session};
 
 /// Rows of the editor.

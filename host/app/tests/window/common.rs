@@ -1,6 +1,6 @@
 //! Shared helpers of the window tests: a window without a display, and an operator's first steps.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -9,8 +9,8 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DAffine3;
 use mortise::kept::StateFolder;
-use mortise::session::Session;
 use mortise::session::notes::Severity;
+use mortise::session::{Intent, Session};
 use mortise::ui::{Window, theme};
 use mortise::viewport::compose::{Look, compose};
 use mortise::viewport::picture::Item;
@@ -148,4 +148,22 @@ pub fn holding() -> Harness<'static, Window> {
     click(&mut harness, "Grab");
     until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
     harness
+}
+
+/// Records while the simulated hand inserts the peg of the sample, which must be on the board; returns the file.
+pub fn record_insertion(harness: &mut Harness<'_, Window>) -> PathBuf {
+    click(harness, "Record");
+    until(harness, "the recording", |s| s.recording.is_some());
+    let recording = harness.state().session.recording.as_ref();
+    let path = recording.expect("just seen").path.clone();
+    click(harness, "Reset parts");
+    arm(harness);
+    click(harness, "peg");
+    click(harness, "Grab");
+    until(harness, "the peg is held", |s| s.grabbed() == Some(1));
+    click(harness, "Play insertion");
+    until(harness, "the verdict", |s| s.verdict.is_some());
+    harness.state_mut().session.act(Intent::EndRecording);
+    until(harness, "the end", |s| s.recording.is_none());
+    path
 }

@@ -9,7 +9,7 @@ use mortise::session::run::RunIntent;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
 
-use crate::common::{arm, click, connect, harness, open_sample, poses, until};
+use crate::common::{click, connect, harness, open_sample, poses, record_insertion, until};
 
 /// The sample with an insertion recorded in a file of `folder`, and the rig disconnected.
 fn recorded(folder: &std::path::Path) -> (Harness<'static, Window>, PathBuf) {
@@ -17,24 +17,7 @@ fn recorded(folder: &std::path::Path) -> (Harness<'static, Window>, PathBuf) {
     harness.state_mut().session.recordings = Some(folder.to_owned());
     open_sample(&mut harness);
     connect(&mut harness);
-    click(&mut harness, "Record");
-    until(&mut harness, "the recording", |s| s.recording.is_some());
-    let path = harness
-        .state()
-        .session
-        .recording
-        .as_ref()
-        .expect("recording")
-        .path
-        .clone();
-    arm(&mut harness);
-    click(&mut harness, "peg");
-    click(&mut harness, "Grab");
-    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
-    click(&mut harness, "Play insertion");
-    until(&mut harness, "the verdict", |s| s.verdict.is_some());
-    harness.state_mut().session.act(Intent::EndRecording);
-    until(&mut harness, "the end", |s| s.recording.is_none());
+    let path = record_insertion(&mut harness);
     let open = Intent::Run(RunIntent::Open(path.clone()));
     assert!(
         obstacle(&harness.state().session, &open).is_some(),
@@ -59,6 +42,7 @@ fn a_run_is_shown_scrubbed_played_compared_and_closed() {
     let data = tempfile::tempdir().expect("a folder");
     let (mut harness, path) = recorded(data.path());
     let before = poses(&harness);
+    let undo = harness.state().session.moves.to_undo().map(str::to_owned);
     act(&mut harness, RunIntent::Open(path.clone()));
     until(&mut harness, "the run is read", |s| s.playback.is_some());
     harness.run_steps(3);
@@ -101,6 +85,11 @@ fn a_run_is_shown_scrubbed_played_compared_and_closed() {
     assert!(figures >= 2, "figures of both: {figures}");
     click(&mut harness, "Close the run");
     assert!(harness.state().session.playback.is_none());
+    assert_eq!(
+        harness.state().session.moves.to_undo().map(str::to_owned),
+        undo,
+        "a run is no step of the history"
+    );
     assert_eq!(poses(&harness), before, "parts are back");
 }
 

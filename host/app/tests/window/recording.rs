@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::common::{arm, click, connect, harness, open_sample, until};
-use mortise::session::Session;
+use crate::common::{click, connect, harness, open_sample, record_insertion, until};
 use mortise::session::link::Link;
 use mortise_record::{Recording, replay};
 
@@ -24,28 +23,7 @@ fn a_session_is_recorded_and_replays_and_a_lost_link_ends_the_file() {
     harness.state_mut().session.recordings = Some(data.path().join("recordings"));
     open_sample(&mut harness);
     connect(&mut harness);
-    click(&mut harness, "Record");
-    let recording = |session: &Session| session.recording.is_some();
-    until(&mut harness, "the recording", recording);
-    click(&mut harness, "Reset parts");
-    arm(&mut harness);
-    click(&mut harness, "peg");
-    click(&mut harness, "Grab");
-    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
-    click(&mut harness, "Play insertion");
-    until(&mut harness, "the verdict", |s| s.verdict.is_some());
-    let end = harness
-        .state()
-        .session
-        .recording
-        .as_ref()
-        .map(|recording| recording.path.clone());
-    harness
-        .state_mut()
-        .session
-        .act(mortise::session::Intent::EndRecording);
-    until(&mut harness, "the end", |s| s.recording.is_none());
-    let path = end.expect("just seen");
+    let path = record_insertion(&mut harness);
     assert_eq!(files(&data.path().join("recordings")), [path.as_path()]);
     let first = Recording::open(&path).expect("a recording");
     assert!(first.complete());
@@ -54,7 +32,7 @@ fn a_session_is_recorded_and_replays_and_a_lost_link_ends_the_file() {
     assert!(replayed.compared > 1000, "{replayed:?}");
 
     click(&mut harness, "Record");
-    until(&mut harness, "another recording", recording);
+    until(&mut harness, "another recording", |s| s.recording.is_some());
     click(&mut harness, "Disconnect");
     until(&mut harness, "the rig is gone", |s| matches!(s.link, Link::None));
     assert!(harness.state().session.recording.is_none());

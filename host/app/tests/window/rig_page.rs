@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use mortise::session::rig_page::{EXAMPLES, RigIntent, Workspace};
+use mortise::session::rig_page::{RigIntent, Workspace};
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
 use mortise_protocol::message::DeviceState;
-use mortise_rig::RigSpec;
 use mortise_rig::commissioning::{Commissioning, Outcome, Step};
+use mortise_rig::{EXAMPLES, RigSpec};
 
 use crate::common::{click, harness, until};
 
@@ -304,4 +304,20 @@ fn a_description_is_checked_while_it_is_written_and_a_damaged_one_is_not_sent() 
         before,
         "a file that cannot be read changes nothing"
     );
+}
+
+#[test]
+fn another_description_that_is_sent_ends_commissioning_and_keeps_its_text() {
+    let mut harness = described("hapkit");
+    click(&mut harness, "Begin");
+    assert!(harness.state().session.rig_page.steps.is_some());
+    let (_, text) = EXAMPLES[2];
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::Rig(RigIntent::Edit(text.to_owned())));
+    harness.run_steps(2);
+    click(&mut harness, "Send to board");
+    until(&mut harness, "the board uses it", |s| s.rig_page.is_in_use());
+    let page = &harness.state().session.rig_page;
+    assert!(page.steps.is_none(), "the steps were those of another mechanism");
+    assert_eq!(page.text(), text, "with its comments");
 }

@@ -1,7 +1,7 @@
 //! Commissioning: the order in which a new rig is tried, one thing at a time, what each result means, and what it corrects in the description.
 //!
 //! Encoders first, by hand and with the motors off: does each count, and in the sense of the description? Then the reference and the stop input, and only
-//! then each motor alone, with a short pulse of a small force ([`ToDevice::TestMotor`]). A step that fails is repeated until it passes; no later step can
+//! then each motor alone, with a short push of a small force ([`ToDevice::TestMotor`]). A step that fails is repeated until it passes; no later step can
 //! be reached before. What a step corrects is taken back by [`Commissioning::back`], and reaches the board only in a step of its own
 //! ([`Step::Send`]).
 //!
@@ -17,7 +17,7 @@ use mortise_protocol::message::{MotorTest, Readings};
 use mortise_protocol::rig::Rig;
 
 pub use step::{Outcome, Step};
-pub use verdict::{Sense, at_rest, both_ways, encoder_sense, motor_sense};
+pub use verdict::{Sense, both_ways, encoder_sense, motor_sense};
 
 #[derive(Clone, Debug)]
 struct Entry {
@@ -215,9 +215,11 @@ impl Commissioning {
                 Outcome::Corrected(words::encoder_corrected(joint, described.encoder_reversed))
             }
             Sense::Still => Outcome::Failed(words::encoder_still(joint)),
-            Sense::Little(turned) => Outcome::Failed(words::turn_farther(joint, turned)),
             Sense::Other(other) => Outcome::Failed(words::encoder_elsewhere(joint, other)),
-            Sense::Unclear => Outcome::Failed(words::encoder_unclear(joint)),
+            Sense::Unclear => {
+                let turned = self.turned(usize::from(joint)).unwrap_or(0.0);
+                Outcome::Failed(words::turn_farther(joint, turned))
+            }
         };
         self.conclude(outcome);
     }
@@ -267,7 +269,7 @@ impl Commissioning {
                     described.motor_reversed = !described.motor_reversed;
                     Outcome::Corrected(words::motor_corrected(joint, described.motor_reversed))
                 }
-                Sense::Still | Sense::Little(_) => Outcome::Failed(words::motor_still(joint)),
+                Sense::Still => Outcome::Failed(words::motor_still(joint)),
                 Sense::Other(other) => Outcome::Failed(words::motor_elsewhere(joint, other)),
                 Sense::Unclear => Outcome::Failed(words::motor_unclear(joint)),
             },

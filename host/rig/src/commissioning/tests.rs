@@ -5,20 +5,7 @@ use mortise_protocol::message::{InputFault, InputFaultKind, ToDevice};
 use mortise_protocol::rig::Rig;
 
 use super::*;
-use crate::{Client, Patience, describe, parse_rig};
-
-const EXAMPLES: [(&str, &str); 4] = [
-    ("hapkit", include_str!("../../../../firmware/rigs/hapkit.toml")),
-    (
-        "haply_2diy",
-        include_str!("../../../../firmware/rigs/haply_2diy.toml"),
-    ),
-    (
-        "woodenhaptics",
-        include_str!("../../../../firmware/rigs/woodenhaptics.toml"),
-    ),
-    ("polhem", include_str!("../../../../firmware/rigs/polhem.toml")),
-];
+use crate::{Client, EXAMPLES, Patience, describe, parse_rig};
 
 /// A simulated board in lockstep with a description in use, and the wiring of its mechanism.
 struct Bench {
@@ -394,7 +381,7 @@ fn a_joint_that_is_hardly_turned_or_falls_by_itself_is_not_judged() {
     let far = (12.0 * per_degree) as i32;
     assert_eq!(encoder_sense(&rig, 1, &counts(1, far)), Sense::Forward);
     assert_eq!(encoder_sense(&rig, 1, &counts(1, -far)), Sense::Backward);
-    assert!(matches!(encoder_sense(&rig, 1, &counts(1, far / 2)), Sense::Little(turned) if turned > 0.1));
+    assert_eq!(encoder_sense(&rig, 1, &counts(1, far / 2)), Sense::Unclear);
     assert_eq!(encoder_sense(&rig, 1, &counts(1, 2)), Sense::Still);
     assert_eq!(encoder_sense(&rig, 1, &counts(2, far)), Sense::Other(2));
     let test = |moved| MotorTest { moved, far: false };
@@ -404,6 +391,27 @@ fn a_joint_that_is_hardly_turned_or_falls_by_itself_is_not_judged() {
     assert_eq!(motor_sense(&rig, 0, &pair(90, 60)), Sense::Unclear);
     assert_eq!(motor_sense(&rig, 0, &pair(3, -3)), Sense::Still);
     assert_eq!(motor_sense(&rig, 1, &pair(60, -60)), Sense::Other(0));
+}
+
+/// Ranges in degrees: one that was reached, one reached in part, and ones exceeded at either end or both.
+#[test]
+fn a_range_is_widened_only_at_the_end_that_was_exceeded() {
+    use super::verdict::{Reached, range};
+    let of = |described: [f32; 2], reached: [f32; 2]| {
+        let (found, note) = range(described.map(f32::to_radians), reached.map(f32::to_radians));
+        (found.map(|end| (10.0 * end.to_degrees()).round() / 10.0), note)
+    };
+    let described = [-60.0, 80.0];
+    assert_eq!(of(described, [-59.0, 80.9]), (described, Reached::Whole));
+    let (found, note) = of(described, [-20.0, 50.0]);
+    assert_eq!(found, described);
+    assert!(
+        matches!(note, Reached::Part(share) if (share - 0.5).abs() < 1e-5),
+        "{note:?}"
+    );
+    assert_eq!(of(described, [-65.0, 30.0]), ([-66.0, 80.0], Reached::Beyond));
+    assert_eq!(of(described, [0.0, 84.0]), ([-60.0, 85.0], Reached::Beyond));
+    assert_eq!(of(described, [-70.0, 90.0]), ([-71.0, 91.0], Reached::Beyond));
 }
 
 #[test]

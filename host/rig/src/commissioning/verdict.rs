@@ -1,4 +1,4 @@
-//! What counts and pulses say about encoders and motors.
+//! What counts and pushes say about encoders and motors.
 
 use std::time::{Duration, Instant};
 
@@ -15,7 +15,7 @@ pub const TURN: f32 = 10.0 * std::f32::consts::PI / 180.0;
 const STILL_COUNTS: i32 = 3;
 /// Factor by which another joint must have turned more, for the two to have been mixed up. Links that carry each other move together, but not so much.
 const MIXED_UP: f32 = 4.0;
-/// Angle that a pulse must move a joint, rad: a tenth of a millimetre at a lever of 0.2 m.
+/// Angle that a push must move a joint, rad: a tenth of a millimetre at a lever of 0.2 m.
 const PUSHED: f32 = 5e-4;
 /// Counts between two readings of a mechanism at rest.
 const REST_COUNTS: i32 = 1;
@@ -38,11 +38,9 @@ pub enum Sense {
     Backward,
     /// Nothing moved.
     Still,
-    /// It turned, but too little to tell: by this angle, rad.
-    Little(f32),
     /// Another joint (from 0) moved in its place.
     Other(u8),
-    /// It moved by itself, or not the same way twice.
+    /// It was turned too little to tell, or moved the same way whichever way it was pushed.
     Unclear,
 }
 
@@ -57,13 +55,13 @@ pub fn encoder_sense(rig: &Rig, joint: u8, counts: &[i32; MAX_ENCODERS]) -> Sens
             Sense::Other(other as u8)
         }
         _ if counts[own].abs() <= STILL_COUNTS => Sense::Still,
-        _ if turned[own].abs() < TURN => Sense::Little(turned[own]),
+        _ if turned[own].abs() < TURN => Sense::Unclear,
         _ if turned[own] > 0.0 => Sense::Forward,
         _ => Sense::Backward,
     }
 }
 
-/// Judges a motor by two pulses of the same size, first forward, then backward.
+/// Judges a motor by two pushes of the same size, first forward, then backward.
 pub fn motor_sense(rig: &Rig, joint: u8, tests: &[MotorTest; 2]) -> Sense {
     let own = usize::from(joint);
     let [forth, back] = tests.map(|test| turned(rig, &test.moved));
@@ -143,10 +141,7 @@ pub fn range(described: [f32; 2], reached: [f32; 2]) -> ([f32; 2], Reached) {
 }
 
 /// Waits until the mechanism rests; whether it does within some seconds.
-///
-/// # Errors
-/// As [`Client::readings`].
-pub fn at_rest(client: &Client) -> Result<bool, RigError> {
+fn at_rest(client: &Client) -> Result<bool, RigError> {
     let begun = Instant::now();
     let mut before = client.readings()?.counts;
     let mut still = 0;

@@ -102,10 +102,6 @@ pub(super) fn encoder_elsewhere(joint: u8, other: u8) -> String {
     )
 }
 
-pub(super) fn encoder_unclear(joint: u8) -> String {
-    format!("joint {} did not turn one way: turn it again", joint + 1)
-}
-
 pub(super) fn stop_works() -> String {
     "opens when pressed, closes when released".into()
 }
@@ -151,7 +147,7 @@ pub(super) fn motor_elsewhere(joint: u8, other: u8) -> String {
 
 pub(super) fn motor_unclear(joint: u8) -> String {
     format!(
-        "joint {} moves the same way under both pulses: gravity or a hand moves it; support the mechanism without holding it, and test again",
+        "joint {} moves the same way under both pushes: gravity or a hand moves it; support the mechanism without holding it, and test again",
         joint + 1
     )
 }

@@ -16,6 +16,20 @@ use crate::words::Words;
 pub use abilities::{Abilities, abilities};
 use digits::significant;
 
+/// Examples of descriptions: name, and text of the file.
+pub const EXAMPLES: [(&str, &str); 4] = [
+    ("hapkit", include_str!("../../../../firmware/rigs/hapkit.toml")),
+    (
+        "haply_2diy",
+        include_str!("../../../../firmware/rigs/haply_2diy.toml"),
+    ),
+    (
+        "woodenhaptics",
+        include_str!("../../../../firmware/rigs/woodenhaptics.toml"),
+    ),
+    ("polhem", include_str!("../../../../firmware/rigs/polhem.toml")),
+];
+
 /// Reasons why a file is no valid description of a rig.
 #[derive(Debug, thiserror::Error)]
 pub enum DescriptionError {

@@ -2,19 +2,6 @@
 
 use super::*;
 
-const EXAMPLES: [(&str, &str); 4] = [
-    ("hapkit", include_str!("../../../../firmware/rigs/hapkit.toml")),
-    (
-        "haply_2diy",
-        include_str!("../../../../firmware/rigs/haply_2diy.toml"),
-    ),
-    (
-        "woodenhaptics",
-        include_str!("../../../../firmware/rigs/woodenhaptics.toml"),
-    ),
-    ("polhem", include_str!("../../../../firmware/rigs/polhem.toml")),
-];
-
 #[test]
 fn every_example_reads_can_work_and_comes_back_as_written() {
     for (name, text) in EXAMPLES {
