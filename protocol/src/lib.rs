@@ -7,6 +7,7 @@ compile_error!("scene images are read in place and are little-endian");
 
 pub mod frame;
 pub mod image;
+pub mod label;
 pub mod limits;
 pub mod message;
 pub mod parameter;

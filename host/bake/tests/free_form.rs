@@ -36,14 +36,8 @@ fn points_near_free_forms(shape: &Shape, count: usize) -> Vec<DVec3> {
         .collect()
 }
 
-/// Samples of free-form faces lie on the kernel's face, and their normals point out of the solid.
-fn shell_is_on_the_surface(
-    file: &Path,
-    load: &LoadOptions,
-    index: usize,
-    surface: &ExactSurface,
-    tolerance: f64,
-) {
+/// Normals of samples of free-form faces point out of the solid; returns the samples.
+fn shell_points_out(file: &Path, load: &LoadOptions, index: usize, surface: &ExactSurface) -> Vec<DVec3> {
     /// Larger than the tolerance, smaller than any wall.
     const STEP_MM: f64 = 0.01;
     let shell = sample_pointshell(surface, &PointshellOptions::everywhere(0.01, 5.0));
@@ -56,20 +50,15 @@ fn shell_is_on_the_surface(
         .collect();
     let step = own.len().div_ceil(60).max(1);
     let own: Vec<_> = own.into_iter().step_by(step).collect();
-    let at = |by: f64| -> Vec<DVec3> { own.iter().map(|p| p.position + p.normal * by).collect() };
-    for foot in oracle::nearest(file, load, index, &at(0.0))
-        .unwrap()
-        .into_iter()
-        .flatten()
-    {
-        assert!(foot.distance < tolerance, "{foot:?}");
+    let at = |by: f64| own.iter().map(move |p| p.position + p.normal * by);
+    let beside: Vec<DVec3> = at(STEP_MM).chain(at(-STEP_MM)).collect();
+    // Each question reads the file again.
+    let sides = oracle::classify(file, load, index, &beside, 1e-7).unwrap();
+    for (i, (p, found)) in own.iter().cycle().zip(sides).enumerate() {
+        let side = if i < own.len() { Side::Out } else { Side::In };
+        assert_eq!(found, side, "{p:?}");
     }
-    for (by, side) in [(STEP_MM, Side::Out), (-STEP_MM, Side::In)] {
-        let sides = oracle::classify(file, load, index, &at(by), 1e-7).unwrap();
-        for (p, found) in own.iter().zip(sides) {
-            assert_eq!(found, side, "{p:?}");
-        }
-    }
+    own.iter().map(|p| p.position).collect()
 }
 
 /// No nearest point found by the kernel is nearer than ours, and ours is on the kernel's surface.
@@ -105,8 +94,11 @@ fn free_forms_agree_with_the_kernel() {
             let points = points_near_free_forms(shape, 100);
             let ours: Vec<_> = points.iter().map(|&p| surface.nearest(p).unwrap()).collect();
             let feet: Vec<DVec3> = ours.iter().map(|n| n.point).collect();
-            let theirs = oracle::nearest(&file, &load, index, &points).unwrap();
-            let beside = oracle::nearest(&file, &load, index, &feet).unwrap();
+            let shell = shell_points_out(&file, &load, index, &surface);
+            let asked: Vec<DVec3> = points.iter().chain(&feet).chain(&shell).copied().collect();
+            let found = oracle::nearest(&file, &load, index, &asked).unwrap();
+            let (theirs, beside) = found.split_at(points.len());
+            let (beside, samples) = beside.split_at(feet.len());
             let tolerance = TOLERANCE_MM + surface.surface_error_mm();
             let (mut farther, mut off, mut missed) = (0.0f64, 0.0f64, 0);
             for (i, ours) in ours.iter().enumerate() {
@@ -130,7 +122,9 @@ fn free_forms_agree_with_the_kernel() {
                 surface.surface_error_mm() * 1e3
             );
             assert!(farther < tolerance && off < tolerance, "{name}");
-            shell_is_on_the_surface(&file, &load, index, &surface, tolerance);
+            for sample in samples.iter().flatten() {
+                assert!(sample.distance < tolerance, "{name}: {sample:?}");
+            }
         }
     }
     println!("skipped: {skipped} of {} files are not there", files.len());

@@ -26,9 +26,17 @@ fn shared(path: &str) -> Option<PathBuf> {
     None
 }
 
-fn quickly(model: &CadModel) -> Result<Baked, BakeError> {
+/// With cells of an eighth of the largest part: the search for cells that fill the image would bake each assembly several times.
+fn coarsely(model: &CadModel) -> Result<Baked, BakeError> {
+    let largest = (model.shapes.iter()).map(|shape| {
+        let corner = |of: fn(DVec3, DVec3) -> DVec3| shape.mesh.vertices.iter().copied().reduce(of);
+        match (corner(DVec3::min), corner(DVec3::max)) {
+            (Some(low), Some(high)) => (high - low).max_element(),
+            _ => 0.0,
+        }
+    });
     let options = BakeOptions {
-        image_limit_bytes: 256 << 10,
+        cell_mm: Some(largest.fold(0.0, f64::max) / 8.0),
         ..BakeOptions::default()
     };
     bake(model, &options, &|_| ControlFlow::Continue(()))
@@ -220,7 +228,7 @@ fn every_real_file_bakes_or_says_why_not() {
 }
 
 fn bakes(name: &str, model: &CadModel) {
-    let baked = quickly(model).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let baked = coarsely(model).unwrap_or_else(|error| panic!("{name}: {error}"));
     let aligned = AlignedBytes::new(&baked.image);
     let image = SceneImage::open(aligned.bytes()).unwrap();
     assert_eq!(image.parts().len(), model.parts.len(), "{name}");

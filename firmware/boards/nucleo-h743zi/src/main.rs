@@ -29,10 +29,16 @@ use cortex_m_rt as _;
 use defmt_rtt as _;
 
 use embassy_stm32::pac::GPIOE;
+use mortise_protocol::label::Label;
 use stm32h743::motor_timer::{self, EnablePin};
 
 /// The board's name in [`mortise_firmware::board::Identity`].
 const BOARD: &str = "nucleo-h743zi";
+/// What a program that writes this firmware to a board reads from the file first.
+// SAFETY: the name is defined once, and nothing of this name is called.
+#[unsafe(no_mangle)]
+#[used]
+static MORTISE_FIRMWARE: Label = Label::new(BOARD, "STM32H743ZITx");
 /// Ticks missed in a row, motors live, that are a fault.
 const OVERRUN_TICKS: u8 = 2;
 /// PE14.

@@ -1,9 +1,10 @@
-//! `mortise rig`: checks, sends and shows the description of a rig.
+//! `mortise rig`: checks, sends and shows the description of a rig, and writes its firmware.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Subcommand;
+use mortise_flash::{Firmware, Prober};
 use mortise_output::lines;
 use mortise_protocol::message::{DeviceState, ToDevice};
 use mortise_rig::{Abilities, Client, RigSpec, abilities, load_rig, write_rig};
@@ -34,6 +35,17 @@ enum Action {
         /// sim, emulated, or a serial port
         #[arg(long, value_parser = units::rig)]
         rig: RigSpec,
+    },
+    /// Write firmware to a board through its debug probe (by the program probe-rs), and read it back
+    Flash {
+        /// Firmware: the file that `cargo xtask firmware` builds
+        file: PathBuf,
+        /// Debug probe, if there are several: its serial number, or vendor, product and serial number
+        #[arg(long)]
+        probe: Option<String>,
+        /// Only look at the file and for the probe
+        #[arg(long)]
+        check: bool,
     },
     /// Print the description stored on a board, as a file
     Show {
@@ -73,6 +85,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 _ => anyhow::bail!("the board does not use the description that was sent: send it again"),
             }
         }
+        Action::Flash { file, probe, check } => flash(file, probe.as_deref(), *check)?,
         Action::Show { rig: spec } => {
             let client = Client::connect(spec)?;
             match client.rig()? {
@@ -89,6 +102,25 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes firmware; the steps that `probe-rs` names go to standard error.
+fn flash(file: &Path, probe: Option<&str>, check: bool) -> anyhow::Result<()> {
+    let firmware = Firmware::read(file)?;
+    lines::text(&format!("{}: {}", file.display(), firmware.words()))?;
+    let prober = Prober::find()?;
+    let probe = prober.choose(probe)?;
+    lines::text(&format!("debug probe: {probe}"))?;
+    if check {
+        return Ok(());
+    }
+    let mut say = |line: &str| eprintln!("  {line}");
+    prober.write(&firmware, &probe, &mut say, &mut || false)?;
+    lines::text(&format!(
+        "{} has its firmware and has started again; `mortise ports` lists it",
+        firmware.board()
+    ))?;
+    Ok(())
 }
 
 /// Whether the rig runs inside this program, in-process or emulated: it loses its description when the program ends.

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use mortise_output::{Existing, Output, OutputError};
 
+use super::flashing::FlashIntent;
 use super::history::{Signal, csv};
 use super::intent::{Intent, Traces};
 use super::outbox::{Outbox, Update};
@@ -22,6 +23,7 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
         Purpose::SaveTraces => Intent::SaveTraces { path, replace },
         Purpose::OpenRun => Intent::Run(RunIntent::Open(path)),
         Purpose::CompareRun => Intent::Run(RunIntent::Compare(path)),
+        Purpose::OpenFirmware => Intent::Flash(FlashIntent::Choose(path)),
         Purpose::OpenRig => Intent::Rig(RigIntent::Load(path)),
         Purpose::SaveRig => Intent::Rig(RigIntent::Write { path, replace }),
         Purpose::SaveRigReport => Intent::Rig(RigIntent::WriteReport { path, replace }),

@@ -13,6 +13,7 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 
 use super::finding::NO_FIT;
+use super::flashing::FlashIntent;
 use super::link::Link;
 use super::moves::Motion;
 use super::rig_page::RigIntent;
@@ -158,6 +159,8 @@ pub enum Intent {
     Run(RunIntent),
     /// An action on the page on the rig.
     Rig(RigIntent),
+    /// An action on the firmware of a board.
+    Flash(FlashIntent),
     /// Let the simulated hand insert the peg into the hole.
     PlayInsertion,
     /// Run everything from the sample to the insertion automatically. `None`: the emulated board if it is available, else in-process.
@@ -349,6 +352,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Record | Intent::EndRecording => record(session, intent),
         Intent::Run(intent) => session.no_run_action(intent),
         Intent::Rig(intent) => session.no_rig_action(intent),
+        Intent::Flash(intent) => session.no_flashing(intent),
         Intent::PlayInsertion => play(session),
     }
 }

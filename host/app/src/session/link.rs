@@ -23,6 +23,7 @@ use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 
 use super::document::Document;
 use super::fits::FitChoice;
+use super::forwarding::pass_on;
 use super::guidance;
 use super::introduction::{introduce, send_rig};
 use super::outbox::{LinkUpdate, Outbox, Update};
@@ -33,9 +34,6 @@ use super::threads::{Cancel, spawn};
 
 /// Time after the first missing answer within which a silent link is noticed.
 const NOTICED: Duration = Duration::from_secs(1);
-
-/// Motion of the handle that is redrawn at once, m: one digit of the displayed position.
-const MOVED_M: f32 = 1e-4;
 
 /// Longest wait for connections to close at the program's end: longer than the greeting of a rig, so that an emulator that has just been
 /// started is ended as well. The window is closed by then.
@@ -287,59 +285,6 @@ fn is_the_links(client: &Client, error: &RigError) -> bool {
             matches!(client.send(ToDevice::Heartbeat), Err(RigError::LinkLost { .. }))
         }
         _ => false,
-    }
-}
-
-/// Whether the motors may exert force, in which case every sample is redrawn.
-fn is_live(state: DeviceState) -> bool {
-    matches!(
-        state,
-        DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop | DeviceState::Testing
-    )
-}
-
-/// Forwards events until there are no more.
-///
-/// While the motors are off and the handle rests, samples change nothing on screen but the traces, so none wakes the window: drawing each
-/// would keep a core busy on a computer without a graphics card. It takes them in when it draws next.
-fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, state: DeviceState) {
-    let mut live = is_live(state);
-    let mut seen = [0.0; 3];
-    loop {
-        match events.recv_timeout(Duration::from_secs(1)) {
-            Ok(event) => {
-                if let Event::Telemetry(sample) = &event {
-                    tap.offer(sample);
-                }
-                if let Event::State { state, .. } = &event {
-                    live = is_live(*state);
-                }
-                let quiet = match &event {
-                    Event::Telemetry(sample) if !live => {
-                        let at = sample.handle.position;
-                        at.iter()
-                            .zip(seen)
-                            .all(|(now, then)| (now - then).abs() < MOVED_M)
-                    }
-                    _ => false,
-                };
-                if let (Event::Telemetry(sample), false) = (&event, quiet) {
-                    seen = sample.handle.position;
-                }
-                let update = LinkUpdate::Event(event);
-                let update = Update::Link { id, update };
-                let heard = if quiet {
-                    outbox.send_quietly(update)
-                } else {
-                    outbox.send(update)
-                };
-                if !heard {
-                    return;
-                }
-            }
-            Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
-            Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => return,
-        }
     }
 }
 

@@ -12,7 +12,9 @@ pub mod document;
 pub mod finding;
 pub mod fits;
 pub mod fitting;
+pub mod flashing;
 mod following;
+mod forwarding;
 pub mod guidance;
 pub mod history;
 pub mod insertion;
@@ -60,6 +62,7 @@ pub mod verdict;
 mod visibility;
 mod ways;
 pub mod work;
+mod write_firmware;
 
 pub use self::intent::{Intent, obstacle};
 pub use self::state::{GUIDE_CAP_N, Job, Lost, Session};

@@ -13,6 +13,7 @@ use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 
 use super::document::Document;
 use super::fitting::FitsFound;
+use super::flashing::FlashUpdate;
 use super::introduction::RigSent;
 use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
@@ -24,8 +25,8 @@ use super::ways::WaysFound;
 use crate::kept::Mark;
 use crate::kept::project::Project;
 
-/// Capacity of the window's queue; a sender blocks when it is full.
-const MAX_WAITING: usize = 1024;
+/// Capacity of the window's queue, more than the samples of a minute without a redraw; a sender blocks when it is full.
+const MAX_WAITING: usize = 4096;
 
 /// A report of another thread.
 pub enum Update {
@@ -94,6 +95,8 @@ pub enum Update {
         /// The project, or one line with the reason of the failure.
         result: Result<ProjectFile, String>,
     },
+    /// Firmware is being written to a board.
+    Flashing(FlashUpdate),
     /// Reading a recorded run ended.
     Run(RunRead),
     /// A file was written, or one line with the reason why not.

@@ -13,6 +13,8 @@ pub enum Purpose {
     OpenRun,
     /// A recorded run to compare with.
     CompareRun,
+    /// Firmware for a board to open.
+    OpenFirmware,
     /// The description of a rig to open.
     OpenRig,
     /// The file for the description of a rig.
@@ -30,6 +32,7 @@ impl Purpose {
             Self::SaveTraces => "Export traces as CSV",
             Self::OpenRun => "Open recorded run",
             Self::CompareRun => "Compare with recorded run",
+            Self::OpenFirmware => "Choose firmware for the board",
             Self::OpenRig => "Open description of a rig",
             Self::SaveRig => "Save description of the rig as",
             Self::SaveRigReport => "Save report of commissioning as",
@@ -40,7 +43,7 @@ impl Purpose {
     pub fn is_saved(self) -> bool {
         !matches!(
             self,
-            Self::OpenModel | Self::OpenRig | Self::OpenRun | Self::CompareRun
+            Self::OpenModel | Self::OpenFirmware | Self::OpenRig | Self::OpenRun | Self::CompareRun
         )
     }
 
@@ -50,6 +53,7 @@ impl Purpose {
             Self::OpenModel => "/folder/assembly.step",
             Self::SaveTraces => "/folder/traces.csv",
             Self::SaveProject => "/folder/assembly.mortise",
+            Self::OpenFirmware => "/folder/nucleo-h743zi",
             Self::OpenRig | Self::SaveRig => "/folder/rig.toml",
             Self::SaveRigReport => "/folder/commissioning.md",
             Self::OpenRun | Self::CompareRun => "/folder/run-1.mcap",
@@ -59,7 +63,7 @@ impl Purpose {
     /// Suggested name of a new file.
     pub fn file_name(self) -> &'static str {
         match self {
-            Self::OpenModel | Self::OpenRig | Self::OpenRun | Self::CompareRun => "",
+            Self::OpenModel | Self::OpenFirmware | Self::OpenRig | Self::OpenRun | Self::CompareRun => "",
             Self::SaveRig => "rig.toml",
             Self::SaveRigReport => "commissioning.md",
             Self::SaveTraces => "traces.csv",
@@ -76,6 +80,8 @@ impl Purpose {
             ),
             Self::SaveTraces => ("CSV", &["csv"]),
             Self::SaveProject => ("Mortise projects", &["mortise"]),
+            // What the linker makes has no ending.
+            Self::OpenFirmware => ("Firmware", &["*"]),
             Self::OpenRig | Self::SaveRig => ("Descriptions of rigs", &["toml"]),
             Self::SaveRigReport => ("Markdown", &["md"]),
             Self::OpenRun | Self::CompareRun => ("Recordings", &["mcap"]),

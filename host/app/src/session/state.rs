@@ -18,6 +18,7 @@ use mortise_rig::{RigEntry, RigSpec};
 use super::document::Document;
 use super::fits::FitChoice;
 use super::fitting::Fitting;
+use super::flashing::Flashing;
 use super::history::History;
 use super::instructions::Instructions;
 use super::keeper::Keeper;
@@ -120,6 +121,8 @@ pub struct Session {
     pub(super) played: Option<Instant>,
     /// The page on the rig.
     pub rig_page: RigPage,
+    /// Firmware for a board.
+    pub flashing: Flashing,
     /// Messages.
     pub notes: Notes,
     /// Contact method of the next bake.
@@ -190,6 +193,7 @@ impl Session {
             partner: None,
             ways: Ways::default(),
             rig_page: RigPage::default(),
+            flashing: Flashing::default(),
             playback: None,
             before_run: None,
             played: None,

@@ -14,6 +14,7 @@ mod description;
 mod drop;
 mod eye;
 mod file_menu;
+mod firmware;
 mod fits;
 pub mod fonts;
 mod gaps;
@@ -47,6 +48,7 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers, Ui};
 
 use self::arrange::Arrangement;
+use crate::session::history::OVERRUN_SPAN_S;
 use crate::session::link::Link;
 use crate::session::rig_page::Workspace;
 use crate::session::{Intent, Session};
@@ -61,9 +63,9 @@ pub fn set_up(ctx: &egui::Context) {
     appearance::follow(ctx);
 }
 
-/// Time between redraws while the motors are off and the handle rests; equals the span of the readout of loop overruns. With software rendering a frame of
-/// 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
-const CALM: Duration = Duration::from_secs(10);
+/// Time between redraws while the motors are off and the handle rests. With software rendering a frame of 1600 × 1000 pixels costs up to 0.7 s of a core.
+/// Motion and changes of state are drawn at once.
+const CALM: Duration = Duration::from_secs(60);
 
 /// State of the window between session and screen.
 pub struct Window {
@@ -151,7 +153,13 @@ impl Window {
         }
         if !matches!(self.session.link, Link::None) {
             // A request without delay would draw two frames.
-            ui.ctx().request_repaint_after(CALM);
+            let counted = self.session.history.late() > 0;
+            let next = if counted {
+                Duration::from_secs_f64(OVERRUN_SPAN_S)
+            } else {
+                CALM
+            };
+            ui.ctx().request_repaint_after(next);
         }
     }
 

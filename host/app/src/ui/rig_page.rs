@@ -1,8 +1,8 @@
-//! The workspace for the rig: its description on the left, its commissioning on the right.
+//! The workspace for the rig: its description and firmware on the left, its commissioning on the right.
 
 use egui::{ScrollArea, Ui, Vec2};
 
-use super::{commissioning, control, description, theme};
+use super::{commissioning, control, description, firmware, theme};
 use crate::session::rig_page::{RigIntent, Workspace};
 use crate::session::{Intent, Session};
 
@@ -19,10 +19,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         ui.horizontal_top(|ui| {
             let half = Vec2::new(0.5 * (size.x - 24.0), size.y);
             for (name, draw) in [
-                (
-                    "description",
-                    description::show as fn(&mut Ui, &Session, &mut Vec<Intent>),
-                ),
+                ("board", board as fn(&mut Ui, &Session, &mut Vec<Intent>)),
                 ("commissioning", commissioning::show),
             ] {
                 ui.allocate_ui(half, |ui| {
@@ -35,9 +32,16 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         scrolled(ui, "rig page", |ui| {
             commissioning::show(ui, session, wanted);
             control::divider(ui);
-            description::show(ui, session, wanted);
+            board(ui, session, wanted);
         });
     }
+}
+
+/// Draws what the board keeps: description and firmware.
+fn board(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    description::show(ui, session, wanted);
+    control::divider(ui);
+    firmware::show(ui, session, wanted);
 }
 
 fn scrolled(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {

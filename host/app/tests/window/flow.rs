@@ -289,8 +289,8 @@ fn loop_overruns_are_those_of_the_last_ten_seconds() {
     harness.get_by_label("none");
 }
 
-/// With the motors off and no motion no sample wakes the window, which draws every ten seconds by itself: with software rendering each frame costs up to
-/// half a second of a core.
+/// With the motors off and no motion no sample wakes the window, which draws every minute by itself: with software rendering each frame costs up to
+/// 0.7 s of a core.
 #[test]
 fn an_idle_rig_does_not_wake_the_window() {
     let woken = Arc::new(AtomicU32::new(0));
@@ -316,13 +316,14 @@ fn an_idle_rig_does_not_wake_the_window() {
     let wakes = woken.load(Ordering::Relaxed) - wakes;
     // 62.5 samples per second.
     assert!(samples > 360, "{samples} samples arrive nevertheless");
-    // A change of state may be among them.
-    assert!(wakes <= 1, "woken {wakes} times in 12 s by {samples} samples");
+    // A change of state and loop overruns may be among them.
+    assert!(wakes <= 2, "woken {wakes} times in 12 s by {samples} samples");
 }
 
-/// What a resting rig sends is drawn every ten seconds: with a rig connected the window asks for its next frame itself, without one it does not.
+/// What a resting rig sends is drawn every minute, and every ten seconds while loop overruns are counted: with a rig connected the window asks for its
+/// next frame itself, without one it does not.
 #[test]
-fn a_connected_window_draws_every_ten_seconds() {
+fn a_connected_window_draws_every_minute() {
     let mut harness = harness();
     let next = |harness: &mut Harness<'_, Window>| {
         // Frames in which something moves ask for the next one at once.
@@ -341,7 +342,28 @@ fn a_connected_window_draws_every_ten_seconds() {
     open_sample(&mut harness);
     assert_eq!(next(&mut harness), Duration::MAX);
     connect(&mut harness);
-    assert_eq!(next(&mut harness), Duration::from_secs(10));
+    let delay = next(&mut harness);
+    // On a busy computer the simulation overruns.
+    let counted = harness.state().session.history.late() > 0;
+    assert_eq!(
+        delay,
+        Duration::from_secs(if counted { 10 } else { 60 }),
+        "loop overruns: {counted}"
+    );
+
+    let mut harness = self::harness();
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::ChooseRig(RigSpec::Simulated { realtime: false }));
+    session.act(Intent::Connect);
+    until(&mut harness, "connected", |s| s.connection().is_some());
+    for (late, expected_s) in [(31, 60), (32, 10)] {
+        harness.state_mut().session.history.add(Sample {
+            time_s: f64::from(late),
+            late,
+            ..Sample::default()
+        });
+        assert_eq!(next(&mut harness), Duration::from_secs(expected_s), "{late}");
+    }
 }
 
 #[test]

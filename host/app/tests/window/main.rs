@@ -5,6 +5,7 @@ mod command_line;
 mod common;
 #[cfg(target_os = "linux")]
 mod desktop_theme;
+mod firmware;
 mod fits;
 mod flow;
 mod fonts;
