@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use mortise_protocol::label::{Label, SYMBOL};
 
-use crate::probe::Prober;
+use crate::prober::Prober;
 
 /// What is wrong with a simulated probe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,9 +1,9 @@
 //! Loadable segments of a 32-bit little-endian ELF file, which is what boards run.
 
 use anyhow::{Context, Result};
-use object::LittleEndian;
 use object::elf::{FileHeader32, PT_LOAD};
-use object::read::elf::{FileHeader as _, ProgramHeader as _};
+use object::read::elf::{ElfFile32, FileHeader as _, ProgramHeader as _};
+use object::{LittleEndian, Object as _};
 
 /// One `PT_LOAD` program header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,15 @@ pub fn segments(file: &[u8]) -> Result<Vec<Segment>> {
         })
         .filter(|segment| segment.bytes > 0)
         .collect())
+}
+
+/// Whether the file's table of symbols has this name.
+///
+/// # Errors
+/// When `file` is not a 32-bit little-endian ELF file.
+pub fn has_symbol(file: &[u8], name: &str) -> Result<bool> {
+    let file = ElfFile32::<LittleEndian>::parse(file).context("not a 32-bit ELF file")?;
+    Ok(file.symbol_by_name(name).is_some())
 }
 
 #[cfg(test)]

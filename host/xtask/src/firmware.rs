@@ -18,6 +18,9 @@ pub const EMULATED: &str = "mps2-an500";
 /// above call chains of some kilobytes.
 const STACK_BYTES: u64 = 16 * 1024;
 
+/// Name of the variable that states what a file of firmware is for; `SYMBOL` of `protocol/src/label.rs`.
+const LABEL: &str = "MORTISE_FIRMWARE";
+
 /// Names of the boards there are, sorted: crates with a linker script.
 pub fn boards(root: &Path) -> Result<Vec<String>> {
     let names = with_file(root, "memory.x")?;
@@ -84,6 +87,10 @@ pub fn build(root: &Path, board: &str) -> Result<PathBuf> {
         eprintln!("  {}", use_line(region, region.used(&segments)));
     }
     check_stack(board, &regions, &segments)?;
+    // The emulator takes the file as it is; a board's firmware states which board it is for.
+    if board != EMULATED && !elf::has_symbol(&file, LABEL)? {
+        bail!("the firmware of {board} has no `{LABEL}`: protocol/src/label.rs says what it is");
+    }
     Ok(path)
 }
 

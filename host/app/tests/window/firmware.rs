@@ -70,7 +70,7 @@ fn firmware_is_chosen_written_and_started() {
 }
 
 #[test]
-fn each_fault_is_told_and_the_window_can_try_again() {
+fn each_fault_is_stated_and_the_window_can_try_again() {
     for (fault, words) in [
         (Fault::Unplugged, "no debug probe is found"),
         (Fault::Forbidden, "udev"),
@@ -84,10 +84,10 @@ fn each_fault_is_told_and_the_window_can_try_again() {
         click(&mut harness, "Write firmware");
         until(&mut harness, "it ended", |s| s.flashing.writing().is_none());
         let session = &harness.state().session;
-        let told = |severity| {
+        let stated = |severity| {
             (session.notes.iter()).any(|note| note.severity == severity && note.text.contains(words))
         };
-        assert!(told(Severity::Error), "{fault:?}");
+        assert!(stated(Severity::Error), "{fault:?}");
         assert_eq!(obstacle(session, &Intent::Flash(FlashIntent::Write)), None);
     }
 }

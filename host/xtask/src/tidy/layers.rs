@@ -78,6 +78,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/energy", &["mortise-bake", "mortise-brep"]),
     ("host/shapes", &[]),
+    ("host/flash", &["mortise-protocol"]),
     (
         "host/fit",
         &["mortise-bake", "mortise-brep", "mortise-mating", "mortise-shapes"],
@@ -125,6 +126,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-bake",
             "mortise-brep",
             "mortise-fit",
+            "mortise-flash",
             "mortise-guide",
             "mortise-inspect",
             "mortise-mating",
