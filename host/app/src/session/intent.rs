@@ -14,6 +14,7 @@ use mortise_rig::RigSpec;
 
 use super::finding::NO_FIT;
 use super::flashing::FlashIntent;
+use super::joints::JointIntent;
 use super::link::Link;
 use super::moves::Motion;
 use super::rig_page::RigIntent;
@@ -161,6 +162,8 @@ pub enum Intent {
     Rig(RigIntent),
     /// An action on the firmware of a board.
     Flash(FlashIntent),
+    /// An action on the joints of a part.
+    Joint(JointIntent),
     /// Let the simulated hand insert the peg into the hole.
     PlayInsertion,
     /// Run everything from the sample to the insertion automatically. `None`: the emulated board if it is available, else in-process.
@@ -201,6 +204,7 @@ impl Intent {
                 | Self::Record
                 | Self::EndRecording
                 | Self::Run(_)
+                | Self::Joint(_)
                 | Self::Rig(RigIntent::Show(_))
                 | Self::Demo(_)
         )
@@ -353,6 +357,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Run(intent) => session.no_run_action(intent),
         Intent::Rig(intent) => session.no_rig_action(intent),
         Intent::Flash(intent) => session.no_flashing(intent),
+        Intent::Joint(intent) => session.no_joint_action(intent),
         Intent::PlayInsertion => play(session),
     }
 }

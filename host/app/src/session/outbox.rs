@@ -15,6 +15,7 @@ use super::document::Document;
 use super::fitting::FitsFound;
 use super::flashing::FlashUpdate;
 use super::introduction::RigSent;
+use super::joints::JointsFound;
 use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
 use super::run::RunRead;
@@ -95,6 +96,8 @@ pub enum Update {
         /// The project, or one line with the reason of the failure.
         result: Result<ProjectFile, String>,
     },
+    /// The joints of a part were searched.
+    Joints(JointsFound),
     /// Firmware is being written to a board.
     Flashing(FlashUpdate),
     /// Reading a recorded run ended.

@@ -126,18 +126,19 @@ impl Session {
         }
     }
 
-    /// Lets a run go on. Returns whether it does, so that the window draws the next frame.
+    /// Lets a run, or the motion that shows a freedom, go on. Returns whether one does, so that the window draws the next frame.
     pub fn play(&mut self, now: Instant) -> bool {
         let passed = self.played.replace(now).map_or(0.0, |then| {
             now.saturating_duration_since(then).as_secs_f64().min(MOST_S)
         });
+        let shows = self.joints.pass(passed);
         match &mut self.playback {
             Some(playback) if playback.plays => {
                 playback.pass(passed);
                 self.show_frame();
                 true
             }
-            _ => false,
+            _ => shows,
         }
     }
 

@@ -21,6 +21,7 @@ use super::fitting::Fitting;
 use super::flashing::Flashing;
 use super::history::History;
 use super::instructions::Instructions;
+use super::joints::Joints;
 use super::keeper::Keeper;
 use super::link::{Connection, Link};
 use super::moves::Moves;
@@ -123,6 +124,8 @@ pub struct Session {
     pub rig_page: RigPage,
     /// Firmware for a board.
     pub flashing: Flashing,
+    /// Joints of a part.
+    pub joints: Joints,
     /// Messages.
     pub notes: Notes,
     /// Contact method of the next bake.
@@ -194,6 +197,7 @@ impl Session {
             ways: Ways::default(),
             rig_page: RigPage::default(),
             flashing: Flashing::default(),
+            joints: Joints::default(),
             playback: None,
             before_run: None,
             played: None,

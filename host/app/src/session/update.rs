@@ -91,6 +91,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         Update::ProjectRead { path, result } => session.project_read(path, result),
         Update::Run(read) => session.run_read(read),
         Update::Flashing(update) => session.flashed(update),
+        Update::Joints(found) => session.joints.take_in(found),
         Update::Written(Ok(done)) => session.notes.add(Severity::Good, done),
         Update::Written(Err(why)) => session.notes.add(Severity::Error, why),
     }

@@ -21,6 +21,7 @@ mod gaps;
 mod guidance;
 mod handles;
 mod header;
+mod joints;
 pub mod keys;
 mod measure;
 mod messages;
@@ -148,7 +149,7 @@ impl Window {
             self.session.act(intent);
         }
         self.keep(ui.ctx());
-        if self.view.wants_all {
+        if self.view.wants_all || self.view.over.now != self.view.over.before {
             ui.ctx().request_repaint();
         }
         if !matches!(self.session.link, Link::None) {
@@ -350,7 +351,7 @@ impl Window {
     }
 }
 
-/// Draws the sequence and the list of clearances at the lower end of the panel of parts.
+/// Draws joints, the sequence and the list of clearances at the lower end of the panel of parts.
 fn below(
     ui: &mut Ui,
     list: &mut clearances::Clearances,
@@ -362,6 +363,7 @@ fn below(
         .resizable(false)
         .frame(egui::Frame::NONE)
         .show(ui, |ui| {
+            joints::show(ui, session, wanted);
             sequence::show(ui, session, view, wanted);
             list.show(ui, session, view);
         });

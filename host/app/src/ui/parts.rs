@@ -1,5 +1,7 @@
 //! The list of parts on the left: the assembly as a tree, and a search in it. A click selects a part, a double click grabs it, the eye hides it.
 
+use std::cell::Cell;
+
 use egui::collapsing_header::CollapsingState;
 use egui::{
     Align, Color32, CornerRadius, Id, Layout, RichText, Role, ScrollArea, Sense, TextEdit, Ui, Vec2,
@@ -30,10 +32,13 @@ pub fn show(
         return;
     };
     field(ui, search);
+    let under = Cell::new(None);
     let listed = Listed {
         session,
         document,
         marked: &view.marked.parts,
+        over: view.over.before,
+        under: &under,
     };
     let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
     let details = session.selected.filter(|&p| p < document.model.parts.len());
@@ -57,6 +62,7 @@ pub fn show(
                 Some(found) => branches(ui, listed, wanted, found, Id::unique("found parts")),
             }
         });
+    view.over.now = under.get().or(view.over.now);
     if let Some(part) = details {
         control::divider(ui);
         self::details(ui, session, document, wanted, part);
@@ -112,6 +118,10 @@ struct Listed<'a> {
     document: &'a Document,
     /// Parts that are pointed out.
     marked: &'a [usize],
+    /// The part under the pointer in the frame before.
+    over: Option<usize>,
+    /// The part whose line is under the pointer.
+    under: &'a Cell<Option<usize>>,
 }
 
 fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches: &[Branch], id: Id) {
@@ -137,13 +147,18 @@ fn line(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, part: usize) 
         session,
         document,
         marked,
+        over,
+        under,
     } = listed;
     let (name, color) = (document.part_name(part), document.colors[part]);
     let (selected, held) = (session.selected == Some(part), session.grabbed() == Some(part));
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 28.0), Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, selected, name));
     let painter = ui.painter_at(rect);
-    let fill = match (held, selected, response.hovered()) {
+    if response.hovered() {
+        under.set(Some(part));
+    }
+    let fill = match (held, selected, response.hovered() || over == Some(part)) {
         (true, ..) => theme::of(ui).held.gamma_multiply(0.22),
         (_, true, _) => theme::of(ui).accent_dim.gamma_multiply(0.8),
         _ if marked.contains(&part) => theme::of(ui).accent_dim.gamma_multiply(0.5),
@@ -184,8 +199,7 @@ fn line(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, part: usize) 
     let galley = painter.layout_job(job);
     let at = egui::Pos2::new(swatch.right() + 8.0, rect.center().y - 0.5 * galley.size().y);
     painter.galley(at, galley, ink);
-    let over = response.hovered();
-    eye::show(ui, session, rect, over, part, wanted);
+    eye::show(ui, session, rect, response.hovered(), part, wanted);
     if response.clicked() {
         wanted.push(Intent::Select(Some(part)));
     }

@@ -54,6 +54,7 @@ pub fn show(
             see_through: view.see_through,
             cut,
             marked: &view.marked.parts,
+            over: view.over.now,
             ground,
             scale,
         };

@@ -31,6 +31,8 @@ const EDGE_HELD_LIGHT: [f32; 4] = [0.55, 0.28, 0.0, 1.0];
 const TINT_HELD: [f32; 4] = [0.96, 0.65, 0.26, 0.55];
 /// Colour mixed into parts that are pointed out, and its weight.
 const TINT_MARKED: [f32; 4] = [0.45, 0.72, 1.0, 0.35];
+/// Colour mixed into the part under the pointer, and its weight.
+const TINT_OVER: [f32; 4] = [0.45, 0.72, 1.0, 0.12];
 /// Colour of the ghost, which shows the pose that the handle commands for the held part.
 const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
 /// Colour of the ghost of a part in a fit.
@@ -57,6 +59,8 @@ pub struct Look<'a> {
     pub cut: Option<Shown<'a>>,
     /// Parts that are pointed out.
     pub marked: &'a [usize],
+    /// The part under the pointer.
+    pub over: Option<usize>,
     /// Background.
     pub ground: Ground,
     /// Pixels per point; 0: edges have no width.
@@ -79,11 +83,13 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
         .filter(|&(index, _)| !document.is_hidden(index) || held == Some(index))
         .map(|(index, part)| {
             let in_hand = held == Some(index);
-            let marked = session.selected == Some(index) || look.marked.contains(&index);
+            let marked =
+                session.selected == Some(index) || look.over == Some(index) || look.marked.contains(&index);
             let glass = look.see_through && !in_hand && is_fixed(document, index);
             Item {
                 shape: part.shape,
-                pose: document.poses[index],
+                pose: (session.joints.displacement(document, index))
+                    .map_or(document.poses[index], |by| by * document.poses[index]),
                 color: document.colors[index].map(|c| f32::from(c) / 255.0),
                 opacity: if glass { SEEN_THROUGH } else { 1.0 },
                 tint: tint(index, held, look),
@@ -95,7 +101,7 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
                 },
                 lit: touching.map_or_else(Vec::new, |t| lit(document, t, index, in_hand)),
                 lit_edges: touching.map_or_else(Vec::new, |t| lit_edges(document, t, index, in_hand)),
-                mates: mates(session, index, fit),
+                mates: mates(session, document, index, fit),
             }
         })
         .collect();
@@ -137,6 +143,8 @@ fn tint(part: usize, held: Option<usize>, look: &Look<'_>) -> [f32; 4] {
         TINT_HELD
     } else if look.marked.contains(&part) {
         TINT_MARKED
+    } else if look.over == Some(part) {
+        TINT_OVER
     } else {
         [0.0; 4]
     }
@@ -229,14 +237,15 @@ fn of_fit(offer: &Offer, side: usize) -> Vec<u32> {
     faces
 }
 
-/// Faces of a part that fit another part's: those of the fit that is shown, and those that are held there, guided or by contact.
-fn mates(session: &Session, part: usize, fit: Option<(usize, &Offer)>) -> Vec<u32> {
+/// Faces of a part that fit another part's: those of the joint that is marked, of the fit that is shown, and those that are held there, guided or by contact.
+fn mates(session: &Session, document: &Document, part: usize, fit: Option<(usize, &Offer)>) -> Vec<u32> {
     let held = session.grabbed();
     let list = (held.is_some() && session.guidance.held == held).then_some(&session.guidance);
     let mut faces = match fit {
         Some((_, offer)) if offer.against == part => of_fit(offer, 1),
         _ => Vec::new(),
     };
+    faces.extend(session.joints.marked_faces(document, part));
     for row in list.into_iter().flat_map(|list| &list.rows) {
         let target = &row.target;
         let own = match &row.standing {

@@ -48,6 +48,15 @@ pub struct Marked {
     pub parts: Vec<usize>,
 }
 
+/// The part under the pointer, in the view or in the list of parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Over {
+    /// In this frame, as far as it is drawn.
+    pub now: Option<usize>,
+    /// In the frame before.
+    pub before: Option<usize>,
+}
+
 /// State of the view.
 #[derive(Default)]
 pub struct Viewpoint {
@@ -59,6 +68,8 @@ pub struct Viewpoint {
     pub section: SectionView,
     /// What is marked, until the next click.
     pub marked: Marked,
+    /// What the pointer is on.
+    pub over: Over,
     /// What was clicked last, in the open document.
     pub picked: Option<Pick>,
     /// The measuring tool.
@@ -81,6 +92,10 @@ impl Viewpoint {
     /// Begins a frame, by which what was wanted in the one before has been done.
     pub fn begin(&mut self) {
         self.shows_all |= std::mem::take(&mut self.wants_all);
+        self.over = Over {
+            now: None,
+            before: self.over.now,
+        };
     }
 
     /// Moves smoothly until everything is visible.
@@ -161,6 +176,13 @@ impl Viewpoint {
             // The part follows the pointer, so the camera rests.
             self.goal = None;
             return;
+        }
+        if !self.measure.on
+            && self.drag.is_none()
+            && !on_handle
+            && let Some(hit) = self.pick(document, rect, response.hover_pos())
+        {
+            self.over.now = Some(hit.part);
         }
         self.start_drag(ui, response, session);
         self.go_on_dragging(ui, response, session);

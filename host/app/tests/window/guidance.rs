@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use crate::common::{arm, click, connect, harness, open_sample, until, worst};
+use crate::common::{arm, click, connect, harness, holding, open_sample, until, worst};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
@@ -235,6 +235,50 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     let session = &harness.state().session;
     assert_eq!(session.guidance, List::default());
     assert_eq!(session.guide, GuideSettings::default());
+}
+
+/// Of two targets that contradict each other the later one names the other, where it is listed.
+#[test]
+fn a_target_in_conflict_names_the_other() {
+    let mut harness = holding();
+    let row = |radius_mm: f64, surface: usize, standing: Standing| Row {
+        target: Target {
+            id: TargetId {
+                moving_part: 1,
+                fixed_part: 0,
+                surfaces: Some([0, surface]),
+            },
+            kind: ConstraintKind::Concentric,
+            moving: axis(),
+            fixed: axis(),
+            play_mm: 0.1,
+            radius_mm,
+            inner_moves: true,
+            moving_faces: vec![0],
+            fixed_faces: vec![0],
+            way: None,
+        },
+        standing,
+        alignment_error: AlignmentError {
+            distance_mm: 0.0,
+            angle_rad: 0.0,
+        },
+        depth_mm: 0.0,
+        inside_mm: None,
+        pinned: false,
+    };
+    let first = row(6.0, 0, Standing::Sent);
+    let other = row(4.0, 1, Standing::Conflict(vec![first.target.id]));
+    let session = &mut harness.state_mut().session;
+    session.guidance = List {
+        held: Some(1),
+        rows: vec![first, other],
+        ..List::default()
+    };
+    // Drawn at once: the guidance thread replaces the list.
+    harness.step();
+    let named = harness.query_all_by_label_contains("Contradicts “Concentric: peg in block”");
+    assert!(named.count() > 0);
 }
 
 fn axis() -> Axis {

@@ -11,7 +11,7 @@ use egui_kittest::kittest::Queryable as _;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session};
 use mortise_protocol::message::{DeviceState, ToDevice};
-use mortise_rig::{Flash, RigSpec, Transport, simulate};
+use mortise_rig::{Client, Flash, RigSpec, Transport, simulate};
 use serialport::{SerialPort as _, TTYPort};
 
 /// A cable between a pseudo-terminal and a simulated board: copies bytes both ways, and none while it is cut.
@@ -162,4 +162,29 @@ fn a_board_that_starts_anew_is_reported_once_and_reached_again() {
     );
     click(&mut harness, "Reconnect");
     until(&mut harness, "connected again", |s| s.device().is_some());
+}
+
+/// Closing the window switches the motors off, whatever was going on.
+#[test]
+fn a_window_that_is_closed_leaves_the_motors_off() {
+    let cable = Cable::new();
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let spec: RigSpec = cable.port.parse().expect("a port's name");
+    harness.state_mut().session.act(Intent::ChooseRig(spec.clone()));
+    click(&mut harness, "Connect");
+    until(
+        &mut harness,
+        "the scene is on the board",
+        Session::scene_is_on_board,
+    );
+    arm(&mut harness);
+    drop(harness);
+    let client = Client::connect(&spec).expect("the port is free again");
+    let state = client.state();
+    // By the window's stop; on a busy computer the watchdog is sometimes first.
+    assert!(
+        matches!(state, DeviceState::Stopped | DeviceState::Fault(_)),
+        "{state:?}"
+    );
 }

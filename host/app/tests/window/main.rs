@@ -3,6 +3,7 @@
 mod clearances;
 mod command_line;
 mod common;
+mod connecting;
 #[cfg(target_os = "linux")]
 mod desktop_theme;
 mod firmware;
@@ -11,6 +12,7 @@ mod flow;
 mod fonts;
 mod getting_started;
 mod guidance;
+mod joints;
 mod kept;
 mod layout;
 #[cfg(unix)]
