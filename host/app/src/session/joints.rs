@@ -230,6 +230,17 @@ impl Joints {
         faces().map_or(&[], Vec::as_slice)
     }
 
+    /// Parts that are looked at: those of the joint that is marked, or the one whose freedom is shown; `None`: all.
+    pub fn in_focus(&self, document: &Document) -> Option<Vec<usize>> {
+        let found = self.found.as_ref()?.as_ref().ok()?;
+        let found = self.of(document, found.part)?;
+        match (self.marked.and_then(|joint| found.joints.get(joint)), self.shown) {
+            (Some(joint), _) => Some(vec![found.part, joint.other]),
+            (None, Some(_)) => Some(vec![found.part]),
+            (None, None) => None,
+        }
+    }
+
     /// By how much the picture shows a part elsewhere.
     pub fn displacement(&self, document: &Document, part: usize) -> Option<DAffine3> {
         let (freedom, seconds) = self.shown?;

@@ -65,9 +65,16 @@ pub fn show(
     view.over.now = under.get().or(view.over.now);
     if let Some(part) = details {
         control::divider(ui);
-        self::details(ui, session, document, wanted, part);
-        ui.add_space(2.0);
-        motion::show(ui, session, view, fields, wanted, part);
+        // Where the sections below are open there may be less room than they take.
+        ScrollArea::vertical()
+            .id_salt("details")
+            .auto_shrink([false, true])
+            .max_height(ui.available_height())
+            .show(ui, |ui| {
+                self::details(ui, session, document, wanted, part);
+                ui.add_space(2.0);
+                motion::show(ui, session, view, fields, wanted, part);
+            });
     }
 }
 

@@ -79,13 +79,16 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
         .as_ref()
         .and_then(|fitting| Some((fitting.moving, fitting.offer()?)));
     let touching = session.telemetry.as_deref().filter(|_| held.is_some());
+    // A part within others is seen through them.
+    let focus = session.joints.in_focus(document);
     let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
         .filter(|&(index, _)| !document.is_hidden(index) || held == Some(index))
         .map(|(index, part)| {
             let in_hand = held == Some(index);
             let marked =
                 session.selected == Some(index) || look.over == Some(index) || look.marked.contains(&index);
-            let glass = look.see_through && !in_hand && is_fixed(document, index);
+            let aside = focus.as_ref().is_some_and(|focus| !focus.contains(&index));
+            let glass = aside || look.see_through && !in_hand && is_fixed(document, index);
             Item {
                 shape: part.shape,
                 pose: (session.joints.displacement(document, index))

@@ -278,8 +278,8 @@ const COMMANDS: [(&str, Run); 32] = [
         Run::Elsewhere("the step `firmware`"),
     ),
     (
-        "probe-rs download --chip STM32H743ZITx firmware/boards/target/thumbv7em-none-eabihf/release/nucleo-h743zi",
-        Run::Elsewhere("needs the board"),
+        "mortise rig flash firmware/boards/target/thumbv7em-none-eabihf/release/nucleo-h743zi",
+        Run::Elsewhere("needs the board; host/flash/tests/writing.rs"),
     ),
     ("cargo xtask test --list", Run::Elsewhere("is what runs this")),
     ("cargo xtask test", Run::Elsewhere("is what runs this")),
@@ -315,7 +315,7 @@ fn commands(page: &str) -> BTreeSet<String> {
     let mut keep = |text: &str| {
         let text = text.split(" #").next().unwrap_or(text).trim();
         let program = text.split(' ').next().unwrap_or_default();
-        if ["cargo", "mortise", "probe-rs"].contains(&program) {
+        if ["cargo", "mortise"].contains(&program) {
             found.insert(text.to_owned());
         }
     };

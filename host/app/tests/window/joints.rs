@@ -79,6 +79,7 @@ fn joints_of_a_part_are_listed_and_the_pointer_on_one_marks_its_faces() {
     assert_eq!(harness.state().session.joints.marked(), Some(0));
     let both: Vec<Item> = picture(&harness).into_iter().filter(marked).collect();
     assert_eq!(both.len(), 2, "the faces of both parts");
+    assert!(both.iter().all(|item| item.opacity == 1.0));
     harness.hover_at(egui::pos2(2.0, 2.0));
     harness.run_steps(4);
     assert!(!picture(&harness).iter().any(marked), "the pointer has left");

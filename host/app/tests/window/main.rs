@@ -19,6 +19,7 @@ mod layout;
 mod link_loss;
 mod measure;
 mod moving;
+mod page;
 mod picture;
 mod playback;
 mod plots;
