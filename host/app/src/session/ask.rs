@@ -23,6 +23,7 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
         Purpose::SaveTraces => Intent::SaveTraces { path, replace },
         Purpose::OpenRun => Intent::Run(RunIntent::Open(path)),
         Purpose::CompareRun => Intent::Run(RunIntent::Compare(path)),
+        Purpose::SaveRunReport => Intent::Run(RunIntent::WriteReport { path, replace }),
         Purpose::OpenFirmware => Intent::Flash(FlashIntent::Choose(path)),
         Purpose::OpenRig => Intent::Rig(RigIntent::Load(path)),
         Purpose::SaveRig => Intent::Rig(RigIntent::Write { path, replace }),

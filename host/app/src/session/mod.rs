@@ -46,6 +46,7 @@ pub mod recording;
 pub mod remaining;
 pub mod rig_page;
 pub mod run;
+mod run_report;
 mod saved;
 pub mod sequence;
 pub mod sequencing;

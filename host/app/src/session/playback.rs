@@ -5,12 +5,14 @@ use std::time::Instant;
 
 use mortise_protocol::image::CRC;
 
+use super::ask::write;
 use super::link::Link;
 use super::notes::Severity;
 use super::outbox::Update;
 use super::pose;
 use super::purpose::Purpose;
 use super::run::{Playback, Run, RunIntent, RunRead};
+use super::run_report::html;
 use super::state::Session;
 use super::threads::spawn;
 
@@ -60,6 +62,13 @@ impl Session {
                     && speed > 0.0
                 {
                     playback.speed = speed;
+                }
+            }
+            RunIntent::SaveReport => self.ask_for_path(Purpose::SaveRunReport),
+            RunIntent::WriteReport { path, replace } => {
+                if let Some(playback) = &self.playback {
+                    let other = playback.compared.as_ref().map(|run| (run, playback.shift_s()));
+                    write(&self.outbox, path, replace, html(&playback.run, other));
                 }
             }
             RunIntent::Close => self.close_run(),

@@ -13,6 +13,8 @@ pub enum Purpose {
     OpenRun,
     /// A recorded run to compare with.
     CompareRun,
+    /// The file for a report of recorded runs.
+    SaveRunReport,
     /// Firmware for a board to open.
     OpenFirmware,
     /// The description of a rig to open.
@@ -32,6 +34,7 @@ impl Purpose {
             Self::SaveTraces => "Export traces as CSV",
             Self::OpenRun => "Open recorded run",
             Self::CompareRun => "Compare with recorded run",
+            Self::SaveRunReport => "Save report of the runs as",
             Self::OpenFirmware => "Choose firmware for the board",
             Self::OpenRig => "Open description of a rig",
             Self::SaveRig => "Save description of the rig as",
@@ -53,6 +56,7 @@ impl Purpose {
             Self::OpenModel => "/folder/assembly.step",
             Self::SaveTraces => "/folder/traces.csv",
             Self::SaveProject => "/folder/assembly.mortise",
+            Self::SaveRunReport => "/folder/run-1.html",
             Self::OpenFirmware => "/folder/nucleo-h743zi",
             Self::OpenRig | Self::SaveRig => "/folder/rig.toml",
             Self::SaveRigReport => "/folder/commissioning.md",
@@ -64,6 +68,7 @@ impl Purpose {
     pub fn file_name(self) -> &'static str {
         match self {
             Self::OpenModel | Self::OpenFirmware | Self::OpenRig | Self::OpenRun | Self::CompareRun => "",
+            Self::SaveRunReport => "run.html",
             Self::SaveRig => "rig.toml",
             Self::SaveRigReport => "commissioning.md",
             Self::SaveTraces => "traces.csv",
@@ -80,6 +85,7 @@ impl Purpose {
             ),
             Self::SaveTraces => ("CSV", &["csv"]),
             Self::SaveProject => ("Mortise projects", &["mortise"]),
+            Self::SaveRunReport => ("Pages", &["html"]),
             // What the linker makes has no ending.
             Self::OpenFirmware => ("Firmware", &["*"]),
             Self::OpenRig | Self::SaveRig => ("Descriptions of rigs", &["toml"]),

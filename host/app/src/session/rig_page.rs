@@ -142,7 +142,7 @@ impl Wiring {
     }
 }
 
-/// What a description is worth.
+/// A description without errors.
 #[derive(Clone, Debug)]
 pub struct Checked {
     /// The description.

@@ -100,6 +100,18 @@ impl Run {
         }
     }
 
+    /// A run of these samples.
+    #[cfg(test)]
+    pub(super) fn of(path: &str, samples: impl Iterator<Item = Sample>) -> Self {
+        let mut run = Self {
+            path: PathBuf::from(path),
+            ..Self::default()
+        };
+        samples.for_each(|sample| run.history.add(sample));
+        run.duration_s = run.history.newest().map_or(0.0, |newest| newest.time_s);
+        run
+    }
+
     /// Length, s.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
@@ -138,6 +150,15 @@ pub enum RunIntent {
     GoTo(f64),
     /// Seconds of the run in a second.
     Speed(f64),
+    /// Ask where to write a report.
+    SaveReport,
+    /// Write a report of the runs that are shown.
+    WriteReport {
+        /// File to write.
+        path: PathBuf,
+        /// Whether an existing file may be replaced.
+        replace: bool,
+    },
     /// Show no run any more.
     Close,
 }

@@ -62,15 +62,24 @@ fn table(page: &mut String, run: &Run, other: Option<&Run>) {
     let rows: [(&str, Cell); 9] = [
         ("Length, s", |run| format!("{:.1}", run.duration_s())),
         ("First touch, s", |run| {
-            run.touch_s.map_or("none".to_owned(), |touch| format!("{touch:.2}"))
+            run.touch_s
+                .map_or("none".to_owned(), |touch| format!("{touch:.2}"))
         }),
         ("From the touch to the deepest insertion, s", |run| {
             format!("{:.2}", run.figures.insertion_s)
         }),
-        ("Deepest insertion, mm", |run| format!("{:.2}", run.figures.insertion_mm)),
-        ("Largest contact force, N", |run| format!("{:.2}", run.figures.contact_n)),
-        ("Largest force on the handle, N", |run| format!("{:.2}", run.figures.handle_n)),
-        ("Deepest penetration, µm", |run| format!("{:.0}", run.figures.depth_um)),
+        ("Deepest insertion, mm", |run| {
+            format!("{:.2}", run.figures.insertion_mm)
+        }),
+        ("Largest contact force, N", |run| {
+            format!("{:.2}", run.figures.contact_n)
+        }),
+        ("Largest force on the handle, N", |run| {
+            format!("{:.2}", run.figures.handle_n)
+        }),
+        ("Deepest penetration, µm", |run| {
+            format!("{:.0}", run.figures.depth_um)
+        }),
         ("Loop time: half, 99 %, all within", loop_time),
         ("Collision models (checksums)", |run| {
             let scenes: Vec<String> = run.scenes.iter().map(|crc| format!("{crc:08x}")).collect();
@@ -111,13 +120,23 @@ fn chart(
             lines.push((index, line, false));
         }
         if let Some((other, shift_s)) = compared {
-            for mut line in envelope(&other.history, signal, -shift_s, length_s - shift_s, wide as usize) {
+            for mut line in envelope(
+                &other.history,
+                signal,
+                -shift_s,
+                length_s - shift_s,
+                wide as usize,
+            ) {
                 line.iter_mut().for_each(|point| point[0] += shift_s);
                 lines.push((index, line, true));
             }
         }
     }
-    let values = || lines.iter().flat_map(|(_, line, _)| line.iter().map(|point| point[1]));
+    let values = || {
+        lines
+            .iter()
+            .flat_map(|(_, line, _)| line.iter().map(|point| point[1]))
+    };
     let (mut low, mut most) = (
         values().fold(f64::INFINITY, f64::min),
         values().fold(f64::NEG_INFINITY, f64::max),
@@ -172,7 +191,11 @@ fn chart(
         );
     }
     for (index, line, dashed) in &lines {
-        let dash = if *dashed { " stroke-dasharray=\"4 3\" opacity=\".75\"" } else { "" };
+        let dash = if *dashed {
+            " stroke-dasharray=\"4 3\" opacity=\".75\""
+        } else {
+            ""
+        };
         let _ = write!(
             page,
             "<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"{dash} points=\"",
@@ -210,25 +233,17 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use super::super::history::Sample;
     use super::*;
 
     fn run(name: &str, samples: usize) -> Run {
-        let mut run = Run {
-            path: PathBuf::from(name),
-            ..Run::default()
+        let sample = |i: usize| Sample {
+            time_s: 0.01 * i as f64,
+            contact_n: (0.1 * i as f32).sin().abs(),
+            cost: 100.0 + i as f32,
+            ..Sample::default()
         };
-        for i in 0..samples {
-            run.history.add(Sample {
-                time_s: 0.01 * i as f64,
-                contact_n: (0.1 * i as f32).sin().abs(),
-                cost: 100.0 + i as f32,
-                ..Sample::default()
-            });
-        }
-        run
+        Run::of(name, (0..samples).map(sample))
     }
 
     #[test]
@@ -237,7 +252,10 @@ mod tests {
         let page = html(&own, Some((&other, 0.5)));
         assert!(page.contains("<h1>&lt;a &amp; b&gt;.mcap</h1>") && page.contains("<th>b.mcap</th>"));
         assert!(page.contains("<h2>Force, N</h2>") && page.contains("stroke-dasharray"));
-        assert!(page.contains("<td>Loop time: half, 99 %, all within</td><td>249, 396, 399</td>"), "{page}");
+        assert!(
+            page.contains("<td>Loop time: half, 99 %, all within</td><td>249, 396, 399</td>"),
+            "{page}"
+        );
         for outside in ["http", "<script", "<link", "src="] {
             assert!(!page.contains(outside), "{outside}");
         }

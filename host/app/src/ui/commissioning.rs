@@ -4,7 +4,7 @@ use egui::{Color32, RichText, Ui, Vec2};
 use egui_plot::{Plot, PlotPoints};
 use mortise_rig::commissioning::{Commissioning, Outcome, Step};
 
-use super::{control, theme};
+use super::{control, loop_time, theme};
 use crate::session::rig_page::{RigIntent, RigPage, TRACE_S, Wiring};
 use crate::session::{Intent, Session};
 
@@ -41,6 +41,8 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     simulated(ui, session, wanted);
     ui.add_space(6.0);
     joints(ui, page);
+    ui.add_space(6.0);
+    loop_time::show(ui, session);
 }
 
 /// Draws the steps with their outcomes.

@@ -10,7 +10,7 @@ use crate::session::{Intent, Session};
 /// Rows of the editor.
 const ROWS: usize = 22;
 
-/// Draws the editor, what it is worth, and what can be done with it.
+/// Draws the editor, the abilities of the described rig, and the actions on it.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let page = &session.rig_page;
     control::section(ui, "Description");
@@ -66,7 +66,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         Some(Err(why)) => {
             ui.label(RichText::new(why).color(theme::of(ui).warning));
         }
-        Some(Ok(checked)) => worth(ui, &checked.abilities),
+        Some(Ok(checked)) => abilities(ui, &checked.abilities),
     }
     ui.add_space(4.0);
     let send = control::primary(ui, "Send to board").min_size(Vec2::new(0.0, 30.0));
@@ -94,7 +94,7 @@ fn examples(ui: &mut Ui, wanted: &mut Vec<Intent>) {
 }
 
 /// What the described rig will be able to do.
-fn worth(ui: &mut Ui, found: &Abilities) {
+fn abilities(ui: &mut Ui, found: &Abilities) {
     ui.spacing_mut().item_spacing.y = 2.0;
     let sensed = if found.senses_orientation {
         "position and orientation"
@@ -121,7 +121,7 @@ fn worth(ui: &mut Ui, found: &Abilities) {
     control::row(ui, "Isotropy at home", format!("{:.2}", found.isotropy)).on_hover_text(singular);
 }
 
-/// Where the text and the board stand to each other.
+/// Whether the board uses what the text describes.
 fn state(session: &Session) -> String {
     let page = &session.rig_page;
     if let Some(busy) = page.busy {

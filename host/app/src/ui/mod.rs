@@ -23,6 +23,7 @@ mod handles;
 mod header;
 mod joints;
 pub mod keys;
+mod loop_time;
 mod measure;
 mod messages;
 mod motion;
@@ -49,7 +50,6 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers, Ui};
 
 use self::arrange::Arrangement;
-use crate::session::history::OVERRUN_SPAN_S;
 use crate::session::link::Link;
 use crate::session::rig_page::Workspace;
 use crate::session::{Intent, Session};
@@ -154,13 +154,7 @@ impl Window {
         }
         if !matches!(self.session.link, Link::None) {
             // A request without delay would draw two frames.
-            let counted = self.session.history.late() > 0;
-            let next = if counted {
-                Duration::from_secs_f64(OVERRUN_SPAN_S)
-            } else {
-                CALM
-            };
-            ui.ctx().request_repaint_after(next);
+            ui.ctx().request_repaint_after(CALM);
         }
     }
 

@@ -40,6 +40,10 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         let hint = "Draw another run beside this one, dashed and aligned by the first touch";
         let compare = Intent::Run(RunIntent::BrowseOther);
         control::intent_button(ui, session, wanted, small("Compare…"), compare, hint);
+        let hint = "Write figures and traces of the runs to a page (HTML) that needs no other file";
+        let report = Intent::Run(RunIntent::SaveReport);
+        control::intent_button(ui, session, wanted, small("Report…"), report, hint)
+            .accessible_name("Report of the run");
         let hint = "Show no run any more; parts go back to where they were";
         let close = Intent::Run(RunIntent::Close);
         control::intent_button(ui, session, wanted, small("Close"), close, hint)

@@ -316,12 +316,11 @@ fn an_idle_rig_does_not_wake_the_window() {
     let wakes = woken.load(Ordering::Relaxed) - wakes;
     // 62.5 samples per second.
     assert!(samples > 360, "{samples} samples arrive nevertheless");
-    // A change of state and loop overruns may be among them.
-    assert!(wakes <= 2, "woken {wakes} times in 12 s by {samples} samples");
+    // A change of state may be among them.
+    assert!(wakes <= 1, "woken {wakes} times in 12 s by {samples} samples");
 }
 
-/// What a resting rig sends is drawn every minute, and every ten seconds while loop overruns are counted: with a rig connected the window asks for its
-/// next frame itself, without one it does not.
+/// What a resting rig sends is drawn every minute: with a rig connected the window asks for its next frame itself, without one it does not.
 #[test]
 fn a_connected_window_draws_every_minute() {
     let mut harness = harness();
@@ -342,28 +341,7 @@ fn a_connected_window_draws_every_minute() {
     open_sample(&mut harness);
     assert_eq!(next(&mut harness), Duration::MAX);
     connect(&mut harness);
-    let delay = next(&mut harness);
-    // On a busy computer the simulation overruns.
-    let counted = harness.state().session.history.late() > 0;
-    assert_eq!(
-        delay,
-        Duration::from_secs(if counted { 10 } else { 60 }),
-        "loop overruns: {counted}"
-    );
-
-    let mut harness = self::harness();
-    let session = &mut harness.state_mut().session;
-    session.act(Intent::ChooseRig(RigSpec::Simulated { realtime: false }));
-    session.act(Intent::Connect);
-    until(&mut harness, "connected", |s| s.connection().is_some());
-    for (late, expected_s) in [(31, 60), (32, 10)] {
-        harness.state_mut().session.history.add(Sample {
-            time_s: f64::from(late),
-            late,
-            ..Sample::default()
-        });
-        assert_eq!(next(&mut harness), Duration::from_secs(expected_s), "{late}");
-    }
+    assert_eq!(next(&mut harness), Duration::from_secs(60));
 }
 
 #[test]

@@ -83,6 +83,18 @@ fn a_run_is_shown_scrubbed_played_compared_and_closed() {
     let name = shown(&harness.state().session).run.name();
     let figures = harness.get_all_by_label_contains(&format!("{name}: ")).count();
     assert!(figures >= 2, "figures of both: {figures}");
+    // Figures and traces of both go to a page.
+    let report = data.path().join("report.html");
+    act(
+        &mut harness,
+        RunIntent::WriteReport {
+            path: report.clone(),
+            replace: false,
+        },
+    );
+    until(&mut harness, "the report", |_| report.exists());
+    let page = std::fs::read_to_string(&report).expect("written");
+    assert!(page.matches(&format!("<th>{name}</th>")).count() == 2 && page.contains("<polyline"));
     click(&mut harness, "Close the run");
     assert!(harness.state().session.playback.is_none());
     assert_eq!(

@@ -38,6 +38,9 @@ fn described(example: &str) -> Harness<'static, Window> {
     click(&mut harness, "Send to board");
     until(&mut harness, "the board uses it", |s| s.rig_page.is_in_use());
     harness.run_steps(3);
+    until(&mut harness, "loops were sampled", |s| s.history.len() > 20);
+    harness.run_steps(2);
+    let _ = harness.get_by_label("Histogram of the loop time");
     harness
 }
 

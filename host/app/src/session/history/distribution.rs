@@ -16,7 +16,11 @@ pub struct Distribution {
 
 /// The distribution of a signal over the whole history, in this number of bins; `None` without samples. Cost: a sort, 2 ms for ten minutes.
 pub fn distribution(history: &History, signal: &Signal, bins: usize) -> Option<Distribution> {
-    let mut values: Vec<f64> = history.iter().filter_map(|s| signal.of(s)).map(f64::from).collect();
+    let mut values: Vec<f64> = history
+        .iter()
+        .filter_map(|s| signal.of(s))
+        .map(f64::from)
+        .collect();
     values.sort_unstable_by(f64::total_cmp);
     let (low, high) = (*values.first()?, *values.last()?);
     let bins = bins.max(1);
