@@ -140,6 +140,13 @@ impl eframe::App for App {
         self.take_screenshot(ui.ctx());
     }
 
+    fn raw_input_hook(&mut self, _ctx: &egui::Context, input: &mut egui::RawInput) {
+        // A picture taken by automation does not depend on where the pointer happens to be.
+        if self.screenshot.is_some() {
+            (input.events).retain(|event| !matches!(event, egui::Event::PointerMoved(_)));
+        }
+    }
+
     fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
         let theme = egui::Theme::from_dark_mode(visuals.dark_mode);
         theme::palette(theme).ground.to_normalized_gamma_f32()

@@ -9,6 +9,8 @@ use crate::session::history::{Signal, distribution};
 
 /// Height of the plot, points.
 const PLOT: f32 = 120.0;
+/// A limit is drawn up to this many times the longest sampled loop.
+const NEAR: f64 = 3.0;
 /// Bars.
 const BINS: usize = 40;
 
@@ -59,7 +61,8 @@ pub fn show(ui: &mut Ui, session: &Session) {
         .x_axis_label(unit)
         .show(ui, |plot| {
             plot.bar_chart(chart);
-            if limit > 0.0 {
+            // A limit far beyond would leave no room for the bars.
+            if limit > 0.0 && limit < NEAR * longest {
                 plot.vline(VLine::new("limit", limit).color(Color32::from(ink.fault_text)));
             }
         });
