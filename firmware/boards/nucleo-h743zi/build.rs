@@ -13,7 +13,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rustc-link-search={}", out.display());
     // The label (mortise_protocol::label), which no code refers to, is kept by name.
     // Here and not in .cargo/config.toml, which follows the current directory.
-    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x", "--undefined=MORTISE_FIRMWARE"] {
+    for argument in [
+        "--nmagic",
+        "-Tlink.x",
+        "-Tdefmt.x",
+        "--undefined=MORTISE_FIRMWARE",
+    ] {
         println!("cargo:rustc-link-arg-bins={argument}");
     }
     Ok(())
