@@ -1,6 +1,6 @@
 //! How long the board's loop takes: a histogram of the samples, beside the limit.
 
-use egui::{Color32, RichText, Ui};
+use egui::{RichText, Ui};
 use egui_plot::{Bar, BarChart, Plot, VLine};
 
 use super::{control, rig, theme};
@@ -63,7 +63,7 @@ pub fn show(ui: &mut Ui, session: &Session) {
             plot.bar_chart(chart);
             // A limit far beyond would leave no room for the bars.
             if limit > 0.0 && limit < NEAR * longest {
-                plot.vline(VLine::new("limit", limit).color(Color32::from(ink.fault_text)));
+                plot.vline(VLine::new("limit", limit).color(ink.fault_text));
             }
         });
     drawn.response.accessible_name("Histogram of the loop time");

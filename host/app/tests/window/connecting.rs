@@ -59,7 +59,7 @@ fn a_port_without_permission_says_how_to_get_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let port = folder.path().join("ttyACM0");
     std::fs::write(&port, "").expect("written");
-    std::fs::set_permissions(&port, std::fs::Permissions::from_mode(0)).expect("no permission");
+    std::fs::set_permissions(&port, std::fs::Permissions::from_mode(0o000)).expect("no permission");
     std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o755)).expect("readable");
     let mut harness = harness();
     harness.step();
