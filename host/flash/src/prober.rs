@@ -15,7 +15,7 @@ use crate::probe::Probe;
 const PROGRAM: &str = "probe-rs";
 /// Longest silence of the program: a chip of 2 MiB is erased within 32 s in the worst case of its data sheet.
 const SILENCE: Duration = Duration::from_secs(60);
-/// Time between two looks at whether the operator ended it.
+/// Time between two calls that ask whether the operator ended it; the documentation of [`Prober::write`] has it as well.
 const LOOK: Duration = Duration::from_millis(50);
 /// Number of the program's last lines that an error quotes.
 const QUOTED: usize = 4;
@@ -106,7 +106,7 @@ impl Prober {
     }
 
     /// Writes firmware through a probe, reads it back, and starts the board again. `on_line` is called with each line that the program says, `ends` every
-    /// [`LOOK`]: once it is `true` the program is ended.
+    /// 50 ms: once it is `true` the program is ended.
     ///
     /// The board stands still from the first moment, with its motors off: the chip's reset switches the outputs off.
     ///
