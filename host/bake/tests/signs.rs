@@ -1,8 +1,8 @@
 //! Inside and outside of all closed parts, against the CAD kernel's own classifier.
 //!
 //! Files are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; if they are absent the tests report it and pass.
-//! `MORTISE_SIGN_POINTS=100000 cargo test --release -p mortise-bake --test signs -- real/` compares as many points as the stated result; without it
-//! 200 per shape keep the tests quick.
+//! `MORTISE_SIGN_POINTS=100000 cargo test --release -p mortise-bake --test signs -- real/` compares as many points as the stated result; without it a
+//! few hundred per shape keep the tests quick.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -77,8 +77,8 @@ fn signs_of(file: &Path) -> Result<(), Failed> {
     };
     let full = std::env::var("MORTISE_SIGN_POINTS").ok();
     let options = SignOptions {
-        points: full.as_ref().map_or(Ok(200), |n| n.parse())?,
-        cells: if full.is_some() { 64.0 } else { 16.0 },
+        points: full.as_ref().map_or(Ok(400), |n| n.parse())?,
+        cells: if full.is_some() { 64.0 } else { 24.0 },
         time_limit_s: 1800,
     };
     let mut wrong = Vec::new();
