@@ -26,7 +26,7 @@ const SCREEN: (u32, u32) = (1600, 1000);
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 /// Largest processor time of an idle minute with software rendering, in times of [`bake_s`] on the same computer, whose speed cancels out: a frame and
 /// 60,000 ticks.
-const IDLE_MAX: f64 = 11.0;
+const IDLE_MAX: f64 = 15.0;
 /// Name of the in-process rig's thread, which exists once the rig is connected.
 const BOARD_THREAD: &str = "mortise-board";
 /// Duration of a measurement: the time between two frames of an idle window.
