@@ -83,6 +83,22 @@ pub enum FlashError {
         /// Probes found.
         found: Vec<Probe>,
     },
+    /// The probes cannot be listed; nothing was written.
+    #[error(
+        "the debug probes cannot be listed: {said}; unplug the probe, plug it in again, and try again: nothing was written"
+    )]
+    NotListed {
+        /// What the program said.
+        said: String,
+    },
+    /// The firmware is on the board, and the board does not run it.
+    #[error(
+        "the firmware is written and read back, but the board was not started again: {said}; press its reset button"
+    )]
+    NotReset {
+        /// What the program said.
+        said: String,
+    },
     /// Writing failed.
     #[error(
         "the firmware was not written: {}; check the board's power and its cable, and try again: until then the board may not start, and its motors stay off",

@@ -94,14 +94,21 @@ impl Prober {
     /// All probes that are connected.
     ///
     /// # Errors
-    /// When the program cannot be run.
+    /// [`FlashError::NotStarted`], [`FlashError::NotListed`].
     pub fn probes(&self) -> Result<Vec<Probe>, FlashError> {
         let mut probes = Vec::new();
         self.run(
             &[OsStr::new("list")],
             &mut |line| probes.extend(Probe::in_line(line)),
             &mut || false,
-        )?;
+        )
+        .map_err(|error| match error {
+            FlashError::Failed { said } => FlashError::NotListed { said },
+            FlashError::Stalled { after_s } => FlashError::NotListed {
+                said: format!("{PROGRAM} said nothing for {after_s:.0} s"),
+            },
+            other => other,
+        })?;
         Ok(probes)
     }
 
@@ -111,7 +118,7 @@ impl Prober {
     /// The board stands still from the first moment, with its motors off: the chip's reset switches the outputs off.
     ///
     /// # Errors
-    /// [`FlashError::Failed`], [`FlashError::Stalled`], [`FlashError::Cancelled`], [`FlashError::NotStarted`].
+    /// [`FlashError::Failed`], [`FlashError::NotReset`], [`FlashError::Stalled`], [`FlashError::Cancelled`], [`FlashError::NotStarted`].
     pub fn write(
         &self,
         firmware: &Firmware,
@@ -129,7 +136,7 @@ impl Prober {
             OsStr::new(firmware.chip()),
             words("--probe"),
             OsStr::new(&probe.selector),
-            // Nothing behind this is an option, whatever the file is called.
+            // No argument after this one is an option, whatever the file is called.
             words("--"),
             firmware.path().as_os_str(),
         ];
@@ -142,7 +149,10 @@ impl Prober {
             words("--probe"),
             OsStr::new(&probe.selector),
         ];
-        self.run(&reset, on_line, ends)
+        self.run(&reset, on_line, ends).map_err(|error| match error {
+            FlashError::Failed { said } => FlashError::NotReset { said },
+            other => other,
+        })
     }
 
     /// Runs the program to its end.
@@ -184,7 +194,7 @@ impl Prober {
                 return Err(FlashError::Cancelled);
             }
             if let Ok(Some(status)) = child.0.try_wait() {
-                // What stands in the pipes still.
+                // What is still in the pipes.
                 while let Ok(line) = lines.recv_timeout(LOOK) {
                     on_line(&line);
                     last.push(line);

@@ -29,11 +29,15 @@ pub enum Fault {
     Worn,
     /// The program says nothing more while writing.
     Silent,
+    /// The program cannot list probes.
+    Unlisted,
+    /// The board is written and does not start again.
+    NotReset,
 }
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::None,
         Self::Unplugged,
         Self::Forbidden,
@@ -42,6 +46,8 @@ impl Fault {
         Self::Pulled,
         Self::Worn,
         Self::Silent,
+        Self::Unlisted,
+        Self::NotReset,
     ];
 }
 
@@ -86,6 +92,14 @@ fn script(fault: Fault) -> String {
         ),
         _ => format!("The following debug probes were found:\n{first}"),
     };
+    let list = match fault {
+        Fault::Unlisted => r#"echo "Error: no USB bus" >&2; exit 1"#.to_owned(),
+        _ => format!("echo '{list}'"),
+    };
+    let reset = match fault {
+        Fault::NotReset => r#"echo "Error: reset timed out" >&2; exit 1"#,
+        _ => "",
+    };
     let download = match fault {
         Fault::Unpowered => {
             r#"echo "Error: Connecting to the chip was unsuccessful." >&2; echo "Caused by: Target device did not respond" >&2; exit 1"#
@@ -107,9 +121,9 @@ here="$(dirname "$0")"
 echo "$*" >> "$here/calls"
 for argument; do file="$argument"; done
 case "$1" in
-list) echo '{list}' ;;
+list) {list} ;;
 download) {download} ;;
-reset) ;;
+reset) {reset} ;;
 *) echo "unrecognized subcommand $1" >&2; exit 2 ;;
 esac
 "#

@@ -66,6 +66,8 @@ fn each_fault_is_named_and_says_what_to_do() {
             Fault::Pulled => &["USB Communication Error", "cable", "motors stay off"],
             Fault::Worn => &["verification failed", "motors stay off"],
             Fault::Silent => &["said nothing for", "motors stay off"],
+            Fault::Unlisted => &["no USB bus", "nothing was written"],
+            Fault::NotReset => &["is written and read back", "reset timed out", "reset button"],
         };
         let said = result.err().map(|error| error.to_string()).unwrap_or_default();
         assert_eq!(said.is_empty(), expected.is_empty(), "{fault:?}: {said}");
@@ -73,7 +75,7 @@ fn each_fault_is_named_and_says_what_to_do() {
             assert!(said.contains(words), "{fault:?}: {said}");
         }
         // Nothing is written before a probe is chosen.
-        let written = matches!(fault, Fault::None | Fault::Pulled | Fault::Worn);
+        let written = matches!(fault, Fault::None | Fault::Pulled | Fault::Worn | Fault::NotReset);
         assert_eq!(flash.is_some(), written, "{fault:?}");
     }
 }

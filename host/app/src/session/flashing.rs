@@ -23,7 +23,7 @@ pub enum FlashIntent {
 pub enum FlashUpdate {
     /// A line that the debug probe's program said.
     Line(String),
-    /// Writing ended; the board, or one line with the reason.
+    /// Writing ended: what was done, or one line with the reason why not.
     Ended(Result<String, String>),
 }
 

@@ -219,8 +219,9 @@ impl Joints {
     /// Faces of a part that are marked.
     pub fn marked_faces(&self, document: &Document, part: usize) -> &[u32] {
         let faces = || {
+            let marked = self.marked?;
             let found = self.found.as_ref()?.as_ref().ok()?;
-            let joint = self.of(document, found.part)?.joints.get(self.marked?)?;
+            let joint = self.of(document, found.part)?.joints.get(marked)?;
             match part {
                 _ if part == found.part => Some(&joint.faces[0]),
                 _ if part == joint.other => Some(&joint.faces[1]),
@@ -232,6 +233,9 @@ impl Joints {
 
     /// Parts that are looked at: those of the joint that is marked, or the one whose freedom is shown; `None`: all.
     pub fn in_focus(&self, document: &Document) -> Option<Vec<usize>> {
+        if self.marked.is_none() && self.shown.is_none() {
+            return None;
+        }
         let found = self.found.as_ref()?.as_ref().ok()?;
         let found = self.of(document, found.part)?;
         match (self.marked.and_then(|joint| found.joints.get(joint)), self.shown) {

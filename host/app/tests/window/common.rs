@@ -167,3 +167,19 @@ pub fn record_insertion(harness: &mut Harness<'_, Window>) -> PathBuf {
     until(harness, "the end", |s| s.recording.is_none());
     path
 }
+
+/// A pseudo-terminal: its end for a board, the port for a program, and a handle that keeps it alive while no program has it open.
+#[cfg(unix)]
+pub fn terminal() -> (serialport::TTYPort, String, std::fs::File) {
+    use serialport::SerialPort as _;
+
+    let (mut master, slave) = serialport::TTYPort::pair().expect("a pseudo-terminal");
+    master.set_timeout(Duration::from_millis(20)).expect("a timeout");
+    let port = slave.name().expect("it has a name");
+    let held = std::fs::OpenOptions::new()
+        .read(true)
+        .write(true)
+        .open(&port)
+        .expect("it opens");
+    (master, port, held)
+}

@@ -92,17 +92,10 @@ fn firmware_of_another_version_is_named_before_anything_is_sent() {
 
     use mortise_protocol::frame::{Decoder, encode};
     use mortise_protocol::message::{FromDevice, Version};
-    use serialport::{SerialPort as _, TTYPort};
 
-    let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
-    master.set_timeout(Duration::from_millis(20)).expect("a timeout");
-    let port = slave.name().expect("it has a name");
-    let held = std::fs::OpenOptions::new()
-        .read(true)
-        .write(true)
-        .open(&port)
-        .expect("it opens");
-    drop(slave);
+    use crate::common::terminal;
+
+    let (mut master, port, held) = terminal();
     let other = Version {
         schema: 0xdead_beef,
         release: [9, 8, 7],

@@ -78,6 +78,8 @@ fn each_fault_is_stated_and_the_window_can_try_again() {
         (Fault::Unpowered, "check the board's power"),
         (Fault::Pulled, "USB Communication Error"),
         (Fault::Worn, "verification failed"),
+        (Fault::Unlisted, "nothing was written"),
+        (Fault::NotReset, "press its reset button"),
     ] {
         let (mut harness, _probe, _folder, file) = page(fault);
         choose(&mut harness, file);

@@ -6,13 +6,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::common::{arm, click, harness, open_sample, until};
+use crate::common::{arm, click, harness, open_sample, terminal, until};
+use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session};
+use mortise::ui::Window;
 use mortise_protocol::message::{DeviceState, ToDevice};
 use mortise_rig::{Client, Flash, RigSpec, Transport, simulate};
-use serialport::{SerialPort as _, TTYPort};
+use serialport::SerialPort as _;
 
 /// A cable between a pseudo-terminal and a simulated board: copies bytes both ways, and none while it is cut.
 struct Cable {
@@ -43,15 +45,7 @@ fn copy(mut from: Box<dyn Read + Send>, mut to: Box<dyn Write + Send>, over: &At
 
 impl Cable {
     fn new() -> Self {
-        let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
-        master.set_timeout(Duration::from_millis(20)).expect("a timeout");
-        let port = slave.name().expect("it has a name");
-        let held = std::fs::OpenOptions::new()
-            .read(true)
-            .write(true)
-            .open(&port)
-            .expect("it opens");
-        drop(slave);
+        let (master, port, held) = terminal();
         let Transport { reader, writer, keep } = simulate(&Flash::default(), true).expect("a thread");
         let (over, cut) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
         let from_host: Box<dyn Read + Send> = master.try_clone().expect("a handle");
@@ -85,16 +79,8 @@ impl Drop for Cable {
     }
 }
 
-fn errors(session: &Session) -> Vec<String> {
-    (session.notes.iter())
-        .filter(|note| note.severity == Severity::Error)
-        .flat_map(|note| vec![note.text.clone(); note.times as usize])
-        .collect()
-}
-
-#[test]
-fn a_lost_link_is_reported_once_with_its_reason_and_reconnect_mends_it() {
-    let cable = Cable::new();
+/// A window with the sample on the board behind a cable, armed.
+fn armed(cable: &Cable) -> (Harness<'static, Window>, RigSpec) {
     let mut harness = harness();
     open_sample(&mut harness);
     let spec: RigSpec = cable.port.parse().expect("a port's name");
@@ -106,6 +92,20 @@ fn a_lost_link_is_reported_once_with_its_reason_and_reconnect_mends_it() {
         Session::scene_is_on_board,
     );
     arm(&mut harness);
+    (harness, spec)
+}
+
+fn errors(session: &Session) -> Vec<String> {
+    (session.notes.iter())
+        .filter(|note| note.severity == Severity::Error)
+        .flat_map(|note| vec![note.text.clone(); note.times as usize])
+        .collect()
+}
+
+#[test]
+fn a_lost_link_is_reported_once_with_its_reason_and_reconnect_mends_it() {
+    let cable = Cable::new();
+    let (mut harness, spec) = armed(&cable);
     assert_eq!(errors(&harness.state().session), [""; 0]);
 
     cable.cut.store(true, Ordering::Relaxed);
@@ -168,17 +168,7 @@ fn a_board_that_starts_anew_is_reported_once_and_reached_again() {
 #[test]
 fn a_window_that_is_closed_leaves_the_motors_off() {
     let cable = Cable::new();
-    let mut harness = harness();
-    open_sample(&mut harness);
-    let spec: RigSpec = cable.port.parse().expect("a port's name");
-    harness.state_mut().session.act(Intent::ChooseRig(spec.clone()));
-    click(&mut harness, "Connect");
-    until(
-        &mut harness,
-        "the scene is on the board",
-        Session::scene_is_on_board,
-    );
-    arm(&mut harness);
+    let (harness, spec) = armed(&cable);
     drop(harness);
     let client = Client::connect(&spec).expect("the port is free again");
     let state = client.state();
