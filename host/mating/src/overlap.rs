@@ -136,6 +136,17 @@ struct DrawnTile {
 }
 
 impl Drawing {
+    /// Area in the chart and its centroid, not a number where there is no area.
+    pub fn area_and_middle(&self) -> (f64, DVec2) {
+        let (mut area, mut moment) = (0.0, DVec2::ZERO);
+        for tile in &self.tiles {
+            let (piece, middle) = area_and_centroid(&self.corners[tile.range.clone()]);
+            area += tile.sign * piece;
+            moment += middle * (tile.sign * piece);
+        }
+        (area, moment / area)
+    }
+
     /// Closes the tile whose corners begin at `start`.
     fn finish(&mut self, start: usize, sign: f64) {
         let corners = &mut self.corners[start..];

@@ -33,6 +33,13 @@ impl Tiles {
         self.corners.extend(corners);
         self.tiles.push((start..self.corners.len(), sign));
     }
+
+    /// Adds the tiles of `more`.
+    pub fn append(&mut self, more: Self) {
+        for (range, sign) in more.tiles {
+            self.push(more.corners[range].iter().copied(), sign);
+        }
+    }
 }
 
 /// A boundary edge that the tiles follow only approximately; its error is an area, length × largest distance.

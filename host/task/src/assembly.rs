@@ -1,5 +1,6 @@
 //! An assembly prepared for questions about contact, freedom and removal.
 
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DVec3};
@@ -9,7 +10,8 @@ use rayon::prelude::*;
 
 use crate::body::Body;
 use crate::clearance::{
-    Gap, Limits, Placed, each_near, free_share, free_share_by_cores, gap, gap_until, least_over, refined,
+    Gap, Limits, Placed, WHOLE, each_near, free_share, free_share_by_cores, gap, gap_until, least_over,
+    refined,
 };
 use crate::error::TaskError;
 use crate::motion::Motion;
@@ -247,13 +249,21 @@ impl Assembly {
         (low - reach, high + reach)
     }
 
+    /// Whether the boxes of two parts as placed are at most `mm` apart.
+    pub fn boxes_are_near(&self, a: usize, b: usize, mm: f64) -> bool {
+        let [(al, ah), (bl, bh)] = [a, b].map(|part| self.bounds(part, DAffine3::IDENTITY));
+        (al - bh).max(bl - ah).max_element() <= mm
+    }
+
+    /// Whether two parts as placed are less than `mm` apart. Cost: ends with the first sample that is.
+    pub fn are_within(&self, a: usize, b: usize, mm: f64) -> bool {
+        let [p, q] = [a, b].map(|part| self.placed(part, DAffine3::IDENTITY));
+        self.boxes_are_near(a, b, mm) && gap_until(p, q, mm, mm).is_some()
+    }
+
     /// Least distance of two parts as placed where it is below `within`.
     pub fn pair_gap(&self, a: usize, b: usize, within: f64) -> Option<Gap> {
-        let ((al, ah), (bl, bh)) = (
-            self.bounds(a, DAffine3::IDENTITY),
-            self.bounds(b, DAffine3::IDENTITY),
-        );
-        if (al - bh).max(bl - ah).max_element() > within {
+        if !self.boxes_are_near(a, b, within) {
             return None;
         }
         gap(
@@ -291,7 +301,7 @@ impl Assembly {
 
     /// Whether a moved group overlaps none of `others` by more than is allowed of the pair.
     pub fn clear(&self, group: &Moved<'_>, others: &[usize]) -> bool {
-        self.blocker(group, others).is_none()
+        self.excess(group, others, 0.0).is_none()
     }
 
     /// The first pair found of a moved group and `others` that overlaps by more than is allowed of it.
@@ -373,8 +383,7 @@ impl Assembly {
         self.free_share_beyond(group, others, motion, step_mm, 0.0, false)
     }
 
-    /// As [`Self::free_share`], by all cores: for a motion that is expected to be free, because no pair ends early when another one meets. Of several pairs that
-    /// meet, the first is stated.
+    /// As [`Self::free_share`], by all cores, with all pairs over the same stretches. Of several pairs that meet at the same share, the first is stated.
     pub fn free_share_by_cores(
         &self,
         group: &Moved<'_>,
@@ -382,11 +391,15 @@ impl Assembly {
         motion: &Motion,
         step_mm: f64,
     ) -> (f64, Option<[usize; 2]>) {
-        let pairs = group
-            .parts
-            .iter()
-            .flat_map(|&a| others.iter().map(move |&b| [a, b]));
-        let pairs: Vec<[usize; 2]> = pairs.collect();
+        let mut pairs: Vec<[usize; 2]> = Vec::new();
+        for &a in group.parts {
+            let (al, ah) = self.swept(&[a], group.by, motion);
+            pairs.extend(others.iter().map(|&b| [a, b]).filter(|&[_, b]| {
+                let (bl, bh) = self.bounds(b, DAffine3::IDENTITY);
+                (al - bh).max(bl - ah).max_element() <= 0.0
+            }));
+        }
+        let earliest = AtomicU64::new(WHOLE);
         let share = |&[a, b]: &[usize; 2]| {
             let limits = Limits {
                 allow_mm: self.allowed_mm(a, b),
@@ -394,7 +407,7 @@ impl Assembly {
                 coarse: false,
             };
             let (a, b) = (self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY));
-            free_share_by_cores(a, b, motion, &limits)
+            free_share_by_cores(a, b, motion, &limits, &earliest)
         };
         let shares: Vec<f64> = pairs.par_iter().with_max_len(1).map(share).collect();
         let first = shares.iter().zip(&pairs).min_by(|(s, _), (t, _)| s.total_cmp(t));
@@ -458,7 +471,30 @@ impl Assembly {
         motion: &Motion,
         step_mm: f64,
     ) -> (f64, Option<[usize; 2]>) {
-        let (share, pair) = self.free_share(group, others, motion, step_mm);
+        let coarse = self.free_share(group, others, motion, step_mm);
+        self.touch_near(group, others, motion, step_mm, coarse)
+    }
+
+    /// As [`Self::touch_share`], by all cores.
+    pub fn touch_share_by_cores(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        motion: &Motion,
+        step_mm: f64,
+    ) -> (f64, Option<[usize; 2]>) {
+        let coarse = self.free_share_by_cores(group, others, motion, step_mm);
+        self.touch_near(group, others, motion, step_mm, coarse)
+    }
+
+    fn touch_near(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        motion: &Motion,
+        step_mm: f64,
+        (share, pair): (f64, Option<[usize; 2]>),
+    ) -> (f64, Option<[usize; 2]>) {
         let Some(pair) = pair else {
             return (share, None);
         };

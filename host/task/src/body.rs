@@ -25,6 +25,9 @@ const COARSE_SHARE: f64 = 1.0 / 40.0;
 /// Time of a query of the exact surface in visits of a sphere.
 const NEAREST_WORK: u64 = 20;
 
+/// Largest sine of the angle between what is parallel: 1e-7 mm over 100 mm.
+const PARALLEL: f64 = 1e-9;
+
 /// Distance below which the line to the nearest point has no reliable direction, mm.
 const ON_SURFACE_MM: f64 = 1e-6;
 
@@ -37,6 +40,8 @@ pub struct Sample {
     pub normal: Option<DVec3>,
     /// Face it lies on (one of them on an edge).
     pub face: u32,
+    /// What it is inside of: number of the face, or of the straight edge counted after the faces; `u32::MAX` elsewhere.
+    inside: u32,
     spacing: Spacing,
 }
 
@@ -62,6 +67,8 @@ pub(crate) struct Node {
     pub first: u32,
     /// Second child; `u32::MAX` for a leaf.
     pub second: u32,
+    /// Face or straight edge inside which all of its samples are, as [`Sample::inside`].
+    pub inside: u32,
 }
 
 impl Node {
@@ -182,13 +189,34 @@ impl Body {
     /// Signed distance and outward normal by the one face that can be nearest to `p`, where the cell of `p` has one.
     fn by_face(&self, p: DVec3) -> Option<(f64, DVec3)> {
         let known = self.kept.of(&self.surface, p, 2)?;
-        let face = self.surface.shape().faces.get(known.face? as usize)?;
+        self.of_face(known.face?, p)
+    }
+
+    /// Signed distance of `p` from the surface of a face, and its outward normal.
+    fn of_face(&self, face: u16, p: DVec3) -> Option<(f64, DVec3)> {
+        let face = self.surface.shape().faces.get(usize::from(face))?;
         let (distance, natural) = face.surface.distance(p)?;
         Some(if face.reversed {
             (-distance, -natural)
         } else {
             (distance, natural)
         })
+    }
+
+    /// Of each face whether it is a plane or cylinder along `direction`, and then of each edge whether it is straight along it.
+    pub(crate) fn along(&self, direction: DVec3) -> Vec<bool> {
+        let direction = direction.normalize_or_zero();
+        let shape = self.surface.shape();
+        let faces = shape.faces.iter().map(|face| match face.surface {
+            Surface::Plane { frame } => frame.z.dot(direction).abs() <= PARALLEL,
+            Surface::Cylinder { frame, .. } => frame.z.cross(direction).length() <= PARALLEL,
+            _ => false,
+        });
+        let edges = shape.edges.iter().map(|edge| match edge.curve {
+            Curve::Line { direction: own, .. } => own.cross(direction).length() <= PARALLEL,
+            _ => false,
+        });
+        faces.chain(edges).collect()
     }
 
     /// Direction in which the signed distance of `p` grows, unit length: from its nearest point, or the face's normal where it lies on the surface; zero
@@ -232,7 +260,15 @@ impl Body {
         if off > 0.0 && off > least {
             return Some(true);
         }
-        let known = self.kept.of(&self.surface, p, level)?;
+        let known = match self.kept.of(&self.surface, p, level) {
+            Some(known) => match known.face {
+                Some(face) => return Some(self.of_face(face, p)?.0 > least),
+                None => known,
+            },
+            // Beyond the cells: by the nearest block.
+            None if level == 0 => self.kept.of(&self.surface, p.clamp(self.low, self.high), 0)?,
+            None => return None,
+        };
         // The value is rounded to seven digits.
         let there = f64::from(known.distance);
         let apart = p.distance(known.at) + there.abs() * 1e-6;
@@ -278,10 +314,15 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
         position: p.position,
         normal,
         face: u32::from(p.face),
+        inside: match normal {
+            Some(_) => u32::from(p.face),
+            None => u32::MAX,
+        },
         spacing,
     })
     .collect();
-    for edge in &surface.shape().edges {
+    let shape = surface.shape();
+    for (number, edge) in shape.edges.iter().enumerate() {
         let Some(&face) = edge.faces.first() else { continue };
         for pair in edge.polyline.windows(2) {
             let steps = (pair[0].distance(pair[1]) / along).ceil().clamp(1.0, 1e4) as usize;
@@ -301,6 +342,10 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
                     position,
                     normal: None,
                     face,
+                    inside: match edge.curve {
+                        Curve::Line { .. } if i > 0 => (shape.faces.len() + number) as u32,
+                        _ => u32::MAX,
+                    },
                     spacing: match edge.curve {
                         Curve::Line { .. } => Spacing::Line,
                         Curve::Circle { radius, .. } => Spacing::Arc(radius),
@@ -365,12 +410,14 @@ fn thin(surface: &ExactSurface, samples: &[Sample], order: Vec<u32>, size: f64) 
 fn split(samples: &[Sample], order: &mut [u32], nodes: &mut Vec<Node>) -> u32 {
     let at = nodes.len() as u32;
     let position = |i: u32| samples[i as usize].position;
+    let inside = |i: u32| samples[i as usize].inside;
     if let [only] = order {
         nodes.push(Node {
             center: position(*only),
             radius: 0.0,
             first: *only,
             second: u32::MAX,
+            inside: inside(*only),
         });
         return at;
     }
@@ -389,6 +436,11 @@ fn split(samples: &[Sample], order: &mut [u32], nodes: &mut Vec<Node>) -> u32 {
         radius,
         first: 0,
         second: 0,
+        inside: order
+            .iter()
+            .map(|&i| inside(i))
+            .reduce(|one, other| if one == other { one } else { u32::MAX })
+            .unwrap_or(u32::MAX),
     });
     let extent = high - low;
     let axis = (0..3)

@@ -8,10 +8,12 @@
 //! What lies between samples is found by a descent on the surface from the least sample ([`refined`]). Parts that rest on each other stay in contact while
 //! they slide, where the bounds end at [`Limits::step_mm`]: there a sample is checked once a step.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use crate::body::Body;
+use crate::body::{Body, Node};
 use crate::motion::Motion;
 use crate::work::work;
 
@@ -230,15 +232,26 @@ pub fn free_share(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits
             items.push((way, 0));
         }
     }
-    let sweep = Sweep { a, b, motion, limits };
+    let earliest = AtomicU64::new(WHOLE);
+    let sweep = Sweep::new(a, b, motion, limits, &earliest);
     sweep.stretch(&items, 0.0, 1.0, 0).unwrap_or(1.0)
 }
+
+/// Bits of the share 1: positive numbers are ordered as their bits.
+pub(crate) const WHOLE: u64 = 1f64.to_bits();
 
 /// Least number of pieces of a body's tree that are swept side by side: most of the work may be in few of them.
 const PIECES: usize = 64;
 
-/// As [`free_share`], to the same bits, by all cores: for a motion that is expected to be free, because no piece ends early when another one meets something.
-pub fn free_share_by_cores(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits) -> f64 {
+/// As [`free_share`], to the same bits, by all cores. `earliest`: bits of the share at which this or another pair has met; what lies beyond is not searched, and
+/// a pair that does not meet before has the share 1.
+pub(crate) fn free_share_by_cores(
+    a: Placed<'_>,
+    b: Placed<'_>,
+    motion: &Motion,
+    limits: &Limits,
+    earliest: &AtomicU64,
+) -> f64 {
     let mut pieces = Vec::new();
     for way in WAYS {
         let nodes = sides(way, a, b).of.nodes(limits.coarse);
@@ -252,7 +265,7 @@ pub fn free_share_by_cores(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits
         }
         pieces.extend(level.into_iter().map(|i| (way, i)));
     }
-    let sweep = Sweep { a, b, motion, limits };
+    let sweep = Sweep::new(a, b, motion, limits, earliest);
     // The first stretch that a piece finds is the earliest of it, and the earliest of all pieces is that of the whole tree.
     let met = pieces
         .par_iter()
@@ -297,12 +310,8 @@ pub fn least_over(
             };
         }
     }
-    let sweep = Sweep {
-        a,
-        b,
-        motion,
-        limits: &limits,
-    };
+    let earliest = AtomicU64::new(WHOLE);
+    let sweep = Sweep::new(a, b, motion, &limits, &earliest);
     sweep.least(&items, 0.0, 1.0, 0, &mut least);
     least.found
 }
@@ -320,14 +329,54 @@ struct Sweep<'a> {
     b: Placed<'a>,
     motion: &'a Motion,
     limits: &'a Limits,
+    /// Bits of the share at which something has met.
+    earliest: &'a AtomicU64,
+    /// Faces and edges of either body along a slide: samples inside follow those of the leading end on the same lines, so that they need a check at the start
+    /// alone.
+    following: [Vec<bool>; 2],
 }
 
 impl<'a> Sweep<'a> {
+    fn new(
+        a: Placed<'a>,
+        b: Placed<'a>,
+        motion: &'a Motion,
+        limits: &'a Limits,
+        earliest: &'a AtomicU64,
+    ) -> Self {
+        let following = [a, b].map(|of| {
+            if motion.angle != 0.0 {
+                return Vec::new();
+            }
+            of.body.along(of.pose.inverse().transform_vector3(motion.slide))
+        });
+        Self {
+            a,
+            b,
+            motion,
+            limits,
+            earliest,
+            following,
+        }
+    }
+
+    /// Whether all samples of a node are inside a face or edge that lies along the slide.
+    fn follows(&self, node: &Node, way: Way) -> bool {
+        let of = &self.following[usize::from(way == Way::Back)];
+        of.get(node.inside as usize).copied().unwrap_or(false)
+    }
+
     fn moved(&self, t: f64) -> Placed<'a> {
         Placed {
             body: self.a.body,
             pose: self.motion.at(t) * self.a.pose,
         }
+    }
+
+    fn is_free_at_start(&self, way: Way, position: DVec3) -> bool {
+        let s = sides(way, self.a, self.b);
+        s.within
+            .exceeds(s.to.transform_point3(position), -self.limits.allow_mm)
     }
 
     /// Place of a node in the other body's frame at `middle`, and a bound on its travel in half of the stretch.
@@ -349,8 +398,12 @@ impl<'a> Sweep<'a> {
         (p, self.motion.speed(arm + slack) * half)
     }
 
-    /// Start of the first stretch within `from`..`to` on which a sample below `items` is too deep; `None` where none is.
+    /// Start of the first stretch within `from`..`to` on which a sample below `items` is too deep; `None` where none is, or none before the earliest found.
     fn stretch(&self, items: &[(Way, u32)], from: f64, to: f64, depth: u32) -> Option<f64> {
+        // What meets at the same share counts: of several pairs the first is stated, whichever core is faster.
+        if from.to_bits() > self.earliest.load(Ordering::Relaxed) {
+            return None;
+        }
         let middle = (from + to) / 2.0;
         let both = WAYS.map(|way| sides(way, self.moved(middle), self.b));
         let mut stack = items.to_vec();
@@ -359,9 +412,20 @@ impl<'a> Sweep<'a> {
             work(1);
             let s = &both[usize::from(way == Way::Back)];
             let node = s.of.nodes(self.limits.coarse)[i as usize];
+            let follows = self.follows(&node, way);
+            if follows && from > 0.0 {
+                continue;
+            }
             let (p, travel) = self.travel(s, way, i, middle, (to - from) / 2.0);
             if s.within.exceeds(p, node.radius + travel - self.limits.allow_mm) {
                 continue;
+            }
+            if follows && node.is_leaf() {
+                if self.is_free_at_start(way, node.center) {
+                    continue;
+                }
+                self.earliest.fetch_min(0, Ordering::Relaxed);
+                return Some(0.0);
             }
             let last = travel <= self.limits.step_mm / 2.0 || depth >= MOST_HALVINGS;
             if !node.is_leaf() && (node.radius > travel || last) {
@@ -370,6 +434,7 @@ impl<'a> Sweep<'a> {
             } else if !last {
                 left.push((way, i));
             } else if !s.within.exceeds(p, -self.limits.allow_mm) {
+                self.earliest.fetch_min(from.to_bits(), Ordering::Relaxed);
                 return Some(from);
             }
         }

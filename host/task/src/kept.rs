@@ -13,7 +13,7 @@ use crate::hints::Hints;
 const CELLS: f64 = 2e6;
 /// Margin of the cells around the shape's box, as a share of its diagonal.
 const MARGIN: f64 = 0.1;
-/// Distance of a cell's middle from the surface, in cells, up to which its face is sought.
+/// Distance of a cell's middle from the surface, in cells, of a block's in blocks, up to which its face is sought.
 const SOUGHT: f64 = 4.0;
 /// Cells along the side of a block.
 const BLOCK: usize = 4;
@@ -33,21 +33,30 @@ pub(crate) struct Kept {
     /// Bits of an `f32`; NaN: not known yet.
     values: Vec<AtomicU32>,
     faces: Vec<AtomicU16>,
-    /// Distances at the middles of blocks of cells.
-    blocks: Vec<AtomicU32>,
+    /// Blocks of cells.
+    blocks: Vec<Cell>,
     block_counts: [usize; 3],
     /// Of cells near the surface that have no face alone, their parts.
-    divided: [RwLock<HashMap<usize, Box<[Part; PARTS * PARTS * PARTS]>>>; SHARDS],
+    divided: [RwLock<HashMap<usize, Box<[Cell; PARTS * PARTS * PARTS]>>>; SHARDS],
     hints: Hints,
 }
 
 /// Locks among which the divided cells are spread.
 const SHARDS: usize = 16;
 
-/// Part of a cell, as a cell.
-struct Part {
+/// A block of cells, or a part of one.
+struct Cell {
     value: AtomicU32,
     face: AtomicU16,
+}
+
+impl Cell {
+    fn unknown() -> Self {
+        Self {
+            value: AtomicU32::new(f32::NAN.to_bits()),
+            face: AtomicU16::new(0),
+        }
+    }
 }
 
 /// What is known of the surroundings of a point.
@@ -69,21 +78,23 @@ impl Kept {
         let counts = extent.to_array().map(|e| (e / cell_mm).ceil().max(1.0) as usize);
         let count = counts.iter().product();
         let block_counts = counts.map(|c| c.div_ceil(BLOCK));
-        let unknown = |n: usize| (0..n).map(|_| AtomicU32::new(f32::NAN.to_bits())).collect();
         Self {
-            blocks: unknown(block_counts.iter().product()),
+            blocks: (0..block_counts.iter().product())
+                .map(|_| Cell::unknown())
+                .collect(),
             block_counts,
             origin,
             cell_mm,
             counts,
-            values: unknown(count),
+            values: (0..count).map(|_| AtomicU32::new(f32::NAN.to_bits())).collect(),
             faces: (0..count).map(|_| AtomicU16::new(0)).collect(),
             divided: std::array::from_fn(|_| RwLock::default()),
             hints: Hints::new(&surface.shape().mesh),
         }
     }
 
-    /// What is known of the surroundings of `p`; `None` outside. `level`: 0 of its block, 1 of its cell, 2 of its part of a cell that has no face alone.
+    /// What is known of the surroundings of `p`; `None` outside. `level`: 0 of its block, 1 of its cell, 2 of its part of a cell;
+    /// of the largest of these that has a face alone.
     pub fn of(&self, surface: &ExactSurface, p: DVec3, level: u8) -> Option<Known> {
         let cells = (p - self.origin) / self.cell_mm;
         // Of what is not negative a cast is the floor, and cheaper.
@@ -94,22 +105,13 @@ impl Kept {
         }
         let index = |[x, y, z]: [usize; 3], [nx, ny, _]: [usize; 3]| (z * ny + y) * nx + x;
         let corner = |at: [usize; 3]| DVec3::from_array(at.map(|i| i as f64));
-        if level == 0 {
-            let block = at.map(|i| i / BLOCK);
-            let value = &self.blocks[index(block, self.block_counts)];
-            let middle = self.origin + (corner(block) + 0.5) * (self.cell_mm * BLOCK as f64);
-            let mut distance = f32::from_bits(value.load(Ordering::Relaxed));
-            if distance.is_nan() {
-                distance = surface
-                    .nearest(middle)
-                    .map_or(f32::INFINITY, |n| n.distance as f32);
-                value.store(distance.to_bits(), Ordering::Relaxed);
-            }
-            return Some(Known {
-                distance,
-                at: middle,
-                face: None,
-            });
+        let block = at.map(|i| i / BLOCK);
+        let size = self.cell_mm * BLOCK as f64;
+        let middle = self.origin + (corner(block) + 0.5) * size;
+        let cell = &self.blocks[index(block, self.block_counts)];
+        let known = self.look_up(surface, &cell.value, &cell.face, middle, size);
+        if level == 0 || known.face.is_some() {
+            return Some(known);
         }
         let (index, at) = (index(at, self.counts), corner(at));
         let middle = self.origin + (at + 0.5) * self.cell_mm;
@@ -131,7 +133,7 @@ impl Kept {
             .clamp(DVec3::ZERO, DVec3::splat(PARTS as f64 - 1.0));
         let part = (place.z as usize * PARTS + place.y as usize) * PARTS + place.x as usize;
         let middle = corner + (place + 0.5) * part_mm;
-        let look = |parts: &[Part; PARTS * PARTS * PARTS]| {
+        let look = |parts: &[Cell; PARTS * PARTS * PARTS]| {
             self.look_up(surface, &parts[part].value, &parts[part].face, middle, part_mm)
         };
         if let Some(parts) = shard.read().ok()?.get(&index) {
@@ -142,10 +144,7 @@ impl Kept {
             return Some(known);
         }
         Some(look(divided.entry(index).or_insert_with(|| {
-            Box::new(std::array::from_fn(|_| Part {
-                value: AtomicU32::new(f32::NAN.to_bits()),
-                face: AtomicU16::new(0),
-            }))
+            Box::new(std::array::from_fn(|_| Cell::unknown()))
         })))
     }
 
@@ -169,7 +168,7 @@ impl Kept {
         let near = surface.nearest(middle);
         let distance = near.map_or(f64::INFINITY, |n| n.distance);
         let face = near
-            .filter(|n| n.distance.abs() < SOUGHT * self.cell_mm)
+            .filter(|n| n.distance.abs() < SOUGHT * size.max(self.cell_mm))
             .and_then(|n| self.alone(surface, middle, size, n.distance, n.face));
         slot.store(face.map_or(NONE, |f| f + 1), Ordering::Relaxed);
         value.store((distance as f32).to_bits(), Ordering::Relaxed);

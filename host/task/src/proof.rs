@@ -2,14 +2,15 @@
 //!
 //! 1. *Linked*: a closed curve inside one part is linked with one inside or on the other. While the parts do not overlap the curves stay disjoint, and their linking
 //!    number cannot change; apart it is 0.
-//! 2. *Ends*: a curve inside one part runs through a flat opening of the other, whose rim lies in the other part, and has at both of its ends a ball within the part that is larger
-//!    than the opening. To come off, the curve passes the rim, or a ball's centre passes the opening; both are overlaps.
+//! 2. *Ends*: a curve inside one part runs through a flat opening of the other, whose rim lies in the other part, and has at both of its ends a ball or a disc within the part
+//!    that is larger than the opening. To come off, the curve passes the rim, or the middle of an end passes the opening; both are overlaps: a disc whose middle is in the
+//!    opening's plane has a diameter there, or all of itself, whose shorter side within the opening is no longer than the opening's radius.
 //! 3. *Passage*: a ball within one part is enclosed by the other: every way of its centre to the outside comes nearer to the other part than the ball's radius ([`crate::passage`]).
 //!
 //! Each proof also holds while the parts overlap by less than a stated depth. None found does not mean that the parts come apart.
 
-use std::collections::{HashMap, VecDeque};
-use std::f64::consts::{PI, TAU};
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{Curve, Surface};
@@ -31,6 +32,9 @@ const LEAST_MM: f64 = 1e-3;
 /// Accuracy of the bound of a passage, mm, and balls that are tried.
 const WITHIN_MM: f64 = 2e-4;
 const BALLS: usize = 3;
+/// Points of each side of an opening that are tried as ends, and rings of a disc that are looked at.
+const TRIED: usize = 12;
+const DISC_STEPS: f64 = 16.0;
 /// Most curves of a skeleton.
 const CYCLES: usize = 4;
 
@@ -39,9 +43,9 @@ const CYCLES: usize = 4;
 pub enum Proof {
     /// A closed curve in one is linked with one in the other.
     Linked,
-    /// A curve through an opening has larger balls at both of its ends.
+    /// A curve through an opening has larger balls or discs at both of its ends.
     Ends {
-        /// Radii of the balls, mm.
+        /// Radii of the balls or discs, mm.
         radius_mm: [f64; 2],
         /// Radius of the opening, mm.
         opening_mm: f64,
@@ -67,7 +71,7 @@ impl std::fmt::Display for Proof {
                 opening_mm,
             } => write!(
                 f,
-                "held on both sides: balls of radius {a:.3} and {b:.3} mm beside an opening of radius {opening_mm:.3} mm"
+                "held on both sides: balls or discs of radius {a:.3} and {b:.3} mm beside an opening of radius {opening_mm:.3} mm"
             ),
             Self::Passage {
                 radius_mm,
@@ -198,38 +202,89 @@ impl<'a> Side<'a> {
             let linked = number.round() != 0.0 && (number - number.round()).abs() < 0.05;
             return linked.then_some((depth - curve.deviation - curve.gap, Proof::Linked));
         }
-        curve.normal?;
-        // Of each side of the opening the deepest point.
-        let opening = curve.inner_radius;
-        let mut deepest: HashMap<(usize, i32), usize> = HashMap::new();
-        for (i, &(root, crossed)) in tree.places.iter().enumerate() {
-            if self.skeleton.depths[i] > opening + LEAST_MM {
-                let known = deepest.entry((root, crossed)).or_insert(i);
-                if self.skeleton.depths[i] > self.skeleton.depths[*known] {
-                    *known = i;
-                }
+        let normal = curve.normal?;
+        // Of each side of the opening the deepest points.
+        let mut sides: BTreeMap<(usize, i32), Vec<usize>> = BTreeMap::new();
+        for (i, &place) in tree.places.iter().enumerate() {
+            sides.entry(place).or_default().push(i);
+        }
+        let mut ends: Vec<((usize, i32), End)> = Vec::new();
+        for (&place, points) in &mut sides {
+            let beyond = |&(root, crossed): &(usize, i32)| root == place.0 && crossed != place.1;
+            if !tree.places.iter().any(beyond) {
+                continue;
             }
+            points.sort_by(|&i, &j| self.skeleton.depths[j].total_cmp(&self.skeleton.depths[i]));
+            points.truncate(TRIED);
+            ends.extend(
+                points
+                    .iter()
+                    .filter_map(|&i| Some((place, self.end(i, curve, normal)?))),
+            );
         }
         let mut best: Option<Locked> = None;
-        for (&(root, crossed), &i) in &deepest {
-            for (&(other, times), &j) in &deepest {
-                if root != other || crossed >= times {
+        for ((root, crossed), one) in &ends {
+            for ((same, times), other) in &ends {
+                if root != same || crossed >= times {
                     continue;
                 }
-                let radius_mm = [i, j].map(|k| self.skeleton.depths[k]);
-                let lacks = (radius_mm[0].min(radius_mm[1]) - opening)
-                    .min(tree.bottleneck(i, j) - curve.deviation)
+                let lacks = (one.lacks_mm.min(other.lacks_mm))
+                    .min(tree.bottleneck(one.at, other.at) - curve.deviation)
                     - curve.gap;
                 if best.is_none_or(|b| lacks > b.0) {
                     let proof = Proof::Ends {
-                        radius_mm,
-                        opening_mm: opening,
+                        radius_mm: [one.radius_mm, other.radius_mm],
+                        opening_mm: curve.inner_radius,
                     };
                     best = Some((lacks, proof));
                 }
             }
         }
         best
+    }
+
+    /// The end of a curve at a point of the skeleton, where a ball or a disc parallel to the opening is larger than that.
+    fn end(&self, at: usize, curve: &Loop, normal: DVec3) -> Option<End> {
+        let (opening, depth) = (curve.inner_radius, self.skeleton.depths[at]);
+        let ball = End {
+            at,
+            radius_mm: depth,
+            lacks_mm: depth - opening,
+        };
+        let radius_mm = opening + LEAST_MM;
+        let disc = End {
+            at,
+            radius_mm,
+            lacks_mm: self.disc_depth(self.skeleton.points[at], normal, radius_mm) - curve.deviation,
+        };
+        let end = if ball.lacks_mm >= disc.lacks_mm {
+            ball
+        } else {
+            disc
+        };
+        (end.lacks_mm >= LEAST_MM).then_some(end)
+    }
+
+    /// Least depth of a disc's points below the surface, at least, mm; 0 where it is not inside.
+    fn disc_depth(&self, center: DVec3, normal: DVec3, radius: f64) -> f64 {
+        let x = normal.any_orthonormal_vector();
+        let y = normal.cross(x);
+        let step = radius / DISC_STEPS;
+        let mut least = f64::INFINITY;
+        // From the rim inwards: most discs that are too large are too large there.
+        for ring in (0..=DISC_STEPS as usize).rev() {
+            let r = step * ring as f64;
+            let count = (TAU * r / step).ceil().max(1.0) as usize;
+            for i in 0..count {
+                let (s, c) = (TAU * i as f64 / count as f64).sin_cos();
+                // No point of the disc is farther from all of these than this.
+                least = least.min(-self.distance(center + (x * c + y * s) * r) - step * FRAC_1_SQRT_2);
+                if least <= 0.0 {
+                    return 0.0;
+                }
+            }
+        }
+        least
     }
 
     /// A proof by a ball of this part inside the other.
@@ -269,6 +324,16 @@ impl<'a> Side<'a> {
         }
         best
     }
+}
+
+/// End of a curve through an opening.
+struct End {
+    /// Point of the skeleton.
+    at: usize,
+    /// Radius of the ball or disc there, mm.
+    radius_mm: f64,
+    /// Overlap that its way through the opening needs, mm.
+    lacks_mm: f64,
 }
 
 /// A circle, and whether it is known to lie on the shape as a whole.

@@ -110,19 +110,18 @@ fn proved(
     let until = now + budget.until.saturating_duration_since(now).mul_f64(PROOF_SHARE);
     // A way that is found meanwhile is an answer, too: there is no proof then.
     let over = || Instant::now() >= until || found_at.load(Ordering::Relaxed) != u64::MAX;
-    let boxed = |a: usize, b: usize| {
-        let ((al, ah), (bl, bh)) = (
-            assembly.bounds(a, DAffine3::IDENTITY),
-            assembly.bounds(b, DAffine3::IDENTITY),
-        );
-        (al - bh).max(bl - ah).max_element() < 0.0
+    // Where boxes have most in common, one part is most likely within the other.
+    let common = |a: usize, b: usize| {
+        let [(al, ah), (bl, bh)] = [a, b].map(|part| assembly.bounds(part, DAffine3::IDENTITY));
+        (ah.min(bh) - al.max(bl)).max(DVec3::ZERO).element_product()
     };
-    let pairs = parts
-        .iter()
-        .flat_map(|&a| others.iter().map(move |&b| (a, b)))
-        .filter(|&(a, b)| boxed(a, b));
+    let pairs = parts.iter().flat_map(|&a| others.iter().map(move |&b| (a, b)));
+    let mut pairs: Vec<(f64, usize, usize)> = pairs.map(|(a, b)| (common(a, b), a, b)).collect();
+    pairs.retain(|pair| pair.0 > 0.0);
+    pairs.sort_by(|p, q| q.0.total_cmp(&p.0));
+    pairs.truncate(PROVED_PAIRS);
     let mut best: Option<(f64, [usize; 2], Proof)> = None;
-    for (a, b) in pairs.take(PROVED_PAIRS) {
+    for (_, a, b) in pairs {
         let [pa, pb] = [a, b].map(|p| (assembly.placed(p, DAffine3::IDENTITY), assembly.skeleton(p)));
         // A way may overlap by what is allowed of the pair.
         if let Some((depth, proof)) = locked(pa, pb, &over)

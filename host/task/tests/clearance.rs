@@ -68,6 +68,29 @@ proptest! {
         prop_assert_eq!(assembly.free_share(&group, &[0], &turn, SEARCH_STEP_MM), (1.0, None));
     }
 
+    /// A slide along the axis, where samples of the bore and of the peg follow each other, ends where poses on it begin to overlap.
+    #[test]
+    fn a_slide_along_the_axis_ends_where_its_poses_overlap(
+        angle in 0.0..std::f64::consts::TAU, aside in 0.0..0.9f64, start in -60.0..60.0f64, length in 1.0..90.0f64, back: bool
+    ) {
+        let (assembly, inside) = pair();
+        let aside = DVec3::new(angle.cos(), angle.sin(), 0.0) * aside;
+        let group = Moved { parts: &[1], by: DAffine3::from_translation(aside + start * DVec3::Z) * *inside };
+        let length = if back { -length } else { length };
+        let motion = Motion::slide(length * DVec3::Z);
+        let step_mm = 0.25;
+        let (share, met) = assembly.free_share(&group, &[0], &motion, step_mm);
+        let clear = |t: f64| assembly.clear(&Moved { parts: &[1], by: motion.at(t) * group.by }, &[0]);
+        let step = step_mm / length.abs();
+        // Where it ends is found to a step.
+        for i in 0..32 {
+            let t = (share - step) * f64::from(i) / 31.0;
+            prop_assert!(share <= step || clear(t), "{t} of {share}");
+        }
+        prop_assert_eq!(met.is_none(), share == 1.0);
+        prop_assert!(met.is_none() || (0..=8).any(|i| !clear((share + step * f64::from(i) / 8.0).min(1.0))), "{share}");
+    }
+
     /// By all cores a motion ends where it ends by one, to the bit.
     #[test]
     fn all_cores_find_what_one_finds(

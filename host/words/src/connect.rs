@@ -1,16 +1,20 @@
 //! connect(a, b): a seat for the part, checked for overlap and for a way in (Jung 2003, fig. 5).
 //!
 //! Seats, in this order: the part's own place against b in the file; places there of equal parts, nearest first; such a place carried over to an equal
-//! bore of b; then ports of a and b that match in diameter ([`crate::matching`]); then flats on each other with bores in line ([`crate::flange`]). A filled seat overlaps the part in it and is passed over. The way
+//! bore of b; then ports of a and b that match in diameter ([`crate::matching`]); then flats on each other with bores in line ([`crate::flange`]);
+//! where no shaft, bore or bores in line fit and the part is not to go inside, then flat on flat ([`crate::plane_seats`]). A filled seat overlaps the part in it and is passed over. The way
 //! in is the way out backwards, straight, from the side asked for.
 
 use glam::{DAffine3, DVec3};
 
 use crate::adjust::range_mm;
+use crate::flange::ON_MM;
 use crate::flange_seats::flanges;
+use crate::lexicon::Relation;
 use crate::manner::Manner;
-use crate::matching::matches;
+use crate::matching::Matches;
 use crate::phrase::Amount;
+use crate::plane_seats::plane_seats;
 use crate::port::Port;
 use crate::reference::direction;
 use crate::turn::{Act, Code, Trouble, Verb};
@@ -18,6 +22,8 @@ use crate::world::World;
 
 /// Cosine between the side asked for and the way out: within 45°.
 const AGREES: f64 = 0.7;
+/// Cosine between directions that are the same.
+const PARALLEL: f64 = 1.0 - 1e-12;
 /// Distance within which two bores are equal, mm.
 const EQUAL_MM: f64 = 1e-3;
 
@@ -73,24 +79,40 @@ fn put(world: &mut World, part: usize, into: usize, manner: &Manner) -> Result<A
             continue;
         }
         tried = true;
-        if let Some(seat) = enter(world, [part, into], &pose, manner, &mut blockers) {
+        if let Some(seat) = enter(world, [part, into], &pose, manner, None, &mut blockers) {
             found = Some(seat);
             break;
         }
     }
     if found.is_none() {
-        let poses = matches(world, part, into, manner, &mut blockers);
-        tried |= !poses.is_empty();
-        found = poses
-            .into_iter()
-            .find_map(|pose| enter(world, [part, into], &pose, manner, &mut blockers));
+        let mut matches = Matches::new(world, part, into, manner);
+        while let Some(inserted) = matches.next(world, &mut blockers) {
+            tried = true;
+            let known = Some(inserted.way_back);
+            found = enter(world, [part, into], &inserted.pose, manner, known, &mut blockers);
+            if found.is_some() {
+                break;
+            }
+        }
     }
     if found.is_none() && manner.hole.is_none() {
-        let poses = flanges(world, part, into);
-        tried |= !poses.is_empty();
+        for pose in flanges(world, part, into) {
+            world.set_placement(part, pose);
+            if world.assembly().are_within(part, into, ON_MM) {
+                tried = true;
+                found = enter(world, [part, into], &pose, manner, None, &mut blockers);
+            }
+            if found.is_some() {
+                break;
+            }
+        }
+    }
+    if found.is_none() && !tried && blockers.is_empty() && manner.relation != Relation::Inside {
+        let poses = plane_seats(world, part, into);
+        tried = !poses.is_empty();
         found = poses
             .into_iter()
-            .find_map(|pose| enter(world, [part, into], &pose, manner, &mut blockers));
+            .find_map(|pose| enter(world, [part, into], &pose, manner, None, &mut blockers));
     }
     world.set_placement(part, now);
     let Some(seat) = found else {
@@ -195,17 +217,18 @@ fn carried_over(world: &World, part: usize, into: usize, pose: &DAffine3) -> Vec
         .collect()
 }
 
-/// Checks a seat: free of overlap, and with a straight way in. The part stands there afterwards.
+/// Checks a seat: free of overlap, and with a straight way in. The part stands there afterwards. `known`: a way out and the travel, mm, on which it is known to be free.
 fn enter(
     world: &mut World,
     [part, into]: [usize; 2],
     pose: &DAffine3,
     manner: &Manner,
+    known: Option<(DVec3, f64)>,
     blockers: &mut Vec<usize>,
 ) -> Option<Seat> {
     world.set_placement(part, *pose);
-    if let Some(found) = world.blocker(part) {
-        blockers.push(found.pair[1]);
+    if let Some(blocker) = world.blocker(part) {
+        blockers.push(blocker);
         return None;
     }
     let loose: Vec<usize> = (0..world.count())
@@ -233,7 +256,13 @@ fn enter(
             .then(w.z.total_cmp(&v.z))
     });
     for (exit, way) in ways {
-        let (_, pair) = world.free(&[part], way, exit);
+        let is_known =
+            known.is_some_and(|(direction, travel)| direction.dot(way) > PARALLEL && exit <= travel);
+        let pair = if is_known {
+            None
+        } else {
+            world.free(&[part], way, exit).1
+        };
         match pair {
             None => {
                 return Some(Seat {

@@ -105,11 +105,21 @@ fn leave(world: &World, part: usize, loose: &[usize], way: DVec3) -> Result<(Vec
     let mut moving = vec![part];
     loop {
         let needed = exit(world, &moving, loose, way) + ROOM_MM;
-        let wanted = needed + world.diagonal();
-        let (free, pair) = world.free(&moving, way, wanted);
+        let (free, pair) = world.free(&moving, way, needed);
         match pair {
-            None => return Ok((moving, wanted)),
-            Some(_) if free >= needed => return Ok((moving, (needed + free) / 2.0)),
+            None => {
+                // Beyond, by boxes alone.
+                let wanted = needed + world.diagonal();
+                let free = world.room_mm(&moving, way, needed, wanted);
+                return Ok((
+                    moving,
+                    if free < wanted {
+                        (needed + free) / 2.0
+                    } else {
+                        wanted
+                    },
+                ));
+            }
             Some([_, blocker]) if loose.contains(&blocker) && moving.len() < MOST_CARRIED => {
                 moving.push(blocker)
             }

@@ -6,14 +6,14 @@ use std::cmp::Ordering;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use crate::flange::{FEWEST, Flat, IN_LINE_MM, ON_MM, PARALLEL, bores, in_line, may_be_in_line};
+use crate::flange::{FEWEST, Flat, IN_LINE_MM, PARALLEL, bores, in_line, may_be_in_line};
 use crate::port::Port;
 use crate::world::World;
 
 /// Least distance of two bores that fix the angle, mm.
 const LEVER_MM: f64 = 1.0;
 /// Most places returned.
-const MOST: usize = 16;
+const MOST: usize = 32;
 
 /// A way to bring bores in line: the motion from where the part is now, without its height along the normal.
 struct Pattern {
@@ -23,10 +23,10 @@ struct Pattern {
     angle: f64,
 }
 
-/// Places of `part` with a flat on a flat of `into` and bores in line, the best first. Flats that would not meet there are left out; overlap is not checked.
+/// Places of `part` with a flat in the plane of a flat of `into` and bores in line, the best first. Whether the flats meet and whether the parts overlap is not checked.
 ///
-/// Cost: for each pair of directions of flats the square of the number of pairs of bores; a distance query for each place.
-pub fn flanges(world: &mut World, part: usize, into: usize) -> Vec<DAffine3> {
+/// Cost: for each pair of directions of flats the square of the number of pairs of bores.
+pub fn flanges(world: &World, part: usize, into: usize) -> Vec<DAffine3> {
     let (now, base) = (world.placement(part), world.placement(into));
     let own: Vec<Flat> = world.flats(part).iter().map(|flat| flat.placed(&now)).collect();
     let others: Vec<Flat> = world.flats(into).iter().map(|flat| flat.placed(&base)).collect();
@@ -68,18 +68,8 @@ pub fn flanges(world: &mut World, part: usize, into: usize) -> Vec<DAffine3> {
         let each = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
         each.fold(Ordering::Equal, Ordering::then)
     });
-    let mut found = Vec::new();
-    for (_, pose) in places {
-        if found.len() >= MOST {
-            break;
-        }
-        world.set_placement(part, pose);
-        if world.assembly().pair_gap(part, into, ON_MM).is_some() {
-            found.push(pose);
-        }
-    }
-    world.set_placement(part, now);
-    found
+    places.truncate(MOST);
+    places.into_iter().map(|(_, pose)| pose).collect()
 }
 
 /// Normals of flats, each direction once.

@@ -21,6 +21,7 @@ pub mod manner;
 pub mod matching;
 mod noun;
 pub mod phrase;
+pub mod plane_seats;
 pub mod port;
 pub mod reference;
 pub mod session;

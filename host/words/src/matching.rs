@@ -3,9 +3,9 @@
 //! Snap policy (Jung 2003, section 4): the most pairs of ports at once, then the tightest, then the smallest rotation, then the nearest bore, entered
 //! from the side on which the part is; as far in as possible: until it meets a stop, or the shaft's end is flush with the bore.
 
-use glam::{DAffine3, DMat3, DQuat, DVec3};
+use std::collections::VecDeque;
 
-use mortise_task::Moved;
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use crate::lexicon::Relation;
 use crate::manner::Manner;
@@ -19,10 +19,13 @@ const TIGHTEST_MM: f64 = 0.02;
 const LEVER_MM: f64 = 1.0;
 /// Most insertions tried.
 const MOST_TRIED: usize = 24;
+/// Cosine between the side asked for and the direction in which the part comes back out: within 45°.
+const AGREES: f64 = 0.7;
 /// Share of the shorter port that must be in the other.
 const ENGAGED: f64 = 0.5;
 
 /// A way to bring the ports on one line.
+#[derive(Clone, Copy)]
 struct Match {
     /// Rotation of the part about its origin, from where it is now, and where its axis then lies.
     rotation: DQuat,
@@ -32,47 +35,76 @@ struct Match {
     other: Port,
 }
 
-/// Placements of `part` with a port matched to one of `into`, the best first. Parts met before the ports engage are added to `blockers`.
-///
-/// Cost: one sweep for each insertion tried, at most `MOST_TRIED`.
-pub fn matches(
-    world: &mut World,
-    part: usize,
-    into: usize,
-    manner: &Manner,
-    blockers: &mut Vec<usize>,
-) -> Vec<DAffine3> {
-    let now = world.placement(part);
-    let mut found = lines(world, part, into, manner);
-    let most = found.iter().map(|m| m.pairs).max().unwrap_or(0);
-    found.retain(|m| m.pairs == most);
-    let tightest = found.iter().map(|m| m.gap).fold(f64::INFINITY, f64::min);
-    found.retain(|m| m.gap <= tightest + TIGHTEST_MM);
-    let here = world.center(part);
-    found.sort_by(|m, n| {
-        let angle = |m: &Match| (m.rotation.to_axis_angle().1 * 1e3).round();
-        let far = |m: &Match| m.other.middle().distance(here);
-        angle(m).total_cmp(&angle(n)).then(far(m).total_cmp(&far(n)))
-    });
-    let mut out = Vec::new();
-    for (tried, m) in found.iter().enumerate() {
-        if tried >= MOST_TRIED {
-            break;
+/// A part pushed in.
+pub struct Inserted {
+    /// Where it stands.
+    pub pose: DAffine3,
+    /// Direction back out, and the travel, mm, on which that is known to be free.
+    pub way_back: (DVec3, f64),
+}
+
+/// Placements of a part with a port matched to one of another part, the best first: found one after another.
+pub struct Matches {
+    now: DAffine3,
+    pair: [usize; 2],
+    /// What is left to try, and from which side; numbered by match.
+    left: VecDeque<(usize, Match, DVec3)>,
+}
+
+impl Matches {
+    /// Prepares the search for `part` at `into`.
+    ///
+    /// Cost: the pairs of ports times those parallel to them.
+    pub fn new(world: &World, part: usize, into: usize, manner: &Manner) -> Self {
+        let mut found = lines(world, part, into, manner);
+        let most = found.iter().map(|m| m.pairs).max().unwrap_or(0);
+        found.retain(|m| m.pairs == most);
+        let tightest = found.iter().map(|m| m.gap).fold(f64::INFINITY, f64::min);
+        found.retain(|m| m.gap <= tightest + TIGHTEST_MM);
+        let here = world.center(part);
+        found.sort_by(|m, n| {
+            let angle = |m: &Match| (m.rotation.to_axis_angle().1 * 1e3).round();
+            let far = |m: &Match| m.other.middle().distance(here);
+            angle(m).total_cmp(&angle(n)).then(far(m).total_cmp(&far(n)))
+        });
+        let mut left = VecDeque::new();
+        for (number, m) in found.into_iter().take(MOST_TRIED).enumerate() {
+            let side = (here - m.other.middle()).dot(m.other.direction);
+            let near = m.other.direction * if side < 0.0 { -1.0 } else { 1.0 };
+            let allowed = |entry: &DVec3| {
+                manner
+                    .from
+                    .is_none_or(|place| direction(place).dot(*entry) >= AGREES)
+            };
+            left.extend(
+                [near, -near]
+                    .into_iter()
+                    .filter(allowed)
+                    .map(|entry| (number, m, entry)),
+            );
         }
-        let side = (here - m.other.middle()).dot(m.other.direction);
-        let near = m.other.direction * if side < 0.0 { -1.0 } else { 1.0 };
-        for entry in [near, -near] {
-            if manner.from.is_some_and(|place| direction(place).dot(entry) < 0.7) {
-                continue;
-            }
-            out.extend(insert(world, [part, into], now, m, entry, blockers));
-        }
-        world.set_placement(part, now);
-        if !out.is_empty() {
-            break;
+        Self {
+            now: world.placement(part),
+            pair: [part, into],
+            left,
         }
     }
-    out
+
+    /// The next placement; once there was one, of the same match only, from its other side. Parts met before the ports engage are added to `blockers`. The part
+    /// is at its old place afterwards.
+    ///
+    /// Cost: one sweep for each insertion tried.
+    pub fn next(&mut self, world: &mut World, blockers: &mut Vec<usize>) -> Option<Inserted> {
+        while let Some((number, m, entry)) = self.left.pop_front() {
+            let inserted = insert(world, self.pair, self.now, &m, entry, blockers);
+            world.set_placement(self.pair[0], self.now);
+            if inserted.is_some() {
+                self.left.retain(|(other, ..)| *other == number);
+                return inserted;
+            }
+        }
+        None
+    }
 }
 
 /// All ways to bring a port of `part` on one line with a port of `into`, in both senses, with the angle about it from a second pair where there is one.
@@ -173,7 +205,7 @@ fn insert(
     m: &Match,
     entry: DVec3,
     blockers: &mut Vec<usize>,
-) -> Option<DAffine3> {
+) -> Option<Inserted> {
     let turn = DMat3::from_quat(m.rotation);
     // The port's origin onto the other's axis.
     let onto = m.other.origin;
@@ -210,7 +242,10 @@ fn insert(
         return None;
     }
     settle(world, part, entry);
-    Some(world.placement(part))
+    Some(Inserted {
+        pose: world.placement(part),
+        way_back: (entry, free),
+    })
 }
 
 /// Travel along `inwards` until the shaft's end is flush with the bore's far end, or a longer shaft's other end with the bore's near end.
@@ -227,24 +262,12 @@ fn flush(own: &Port, other: &Port, inwards: DVec3) -> f64 {
     }
 }
 
-/// A sweep ends within the overlap that counts as contact; the part is set back by what it overlaps at its stop.
+/// A sweep ends within the overlap that counts as contact; the part is set back by what it, and what moves with it, overlaps at its stop.
 fn settle(world: &mut World, part: usize, entry: DVec3) {
-    let moving = [part];
-    let found = world.assembly().clearance(
-        &Moved {
-            parts: &moving,
-            by: DAffine3::IDENTITY,
-        },
-        &world.others(&moving),
-        0.0,
-        false,
-    );
-    if let Some(found) = found
-        && found.gap.away.dot(entry) > 0.5
-    {
-        world.shift(
-            &moving,
-            entry * (-found.gap.distance_mm / found.gap.away.dot(entry)),
-        );
+    if let Some(found) = world.overlap(part) {
+        let along = found.gap.away.dot(entry);
+        if along > 0.5 {
+            world.shift(&[part], entry * (-found.gap.distance_mm / along));
+        }
     }
 }

@@ -4,9 +4,12 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
+use mortise_mating::PlaneRegion;
 use mortise_task::{Assembly, Clearance, Motion, Moved, TaskError};
+use rayon::prelude::*;
 
 use crate::flange::{self, Flat, flats};
+use crate::plane_seats::{laid, regions};
 use crate::port::{Port, ports};
 
 /// Distance within which two placements are the same, mm at the corners of the part's box: well below the micrometre promised.
@@ -44,6 +47,7 @@ pub struct World {
     home: Vec<DAffine3>,
     ports: Vec<Arc<[Port]>>,
     flats: Vec<Arc<[Flat]>>,
+    regions: Vec<Arc<[PlaneRegion]>>,
     /// Number of the first equal shape.
     kinds: Vec<usize>,
     /// Pairs together in the file: in contact, a shaft in a bore, or within [`NEAR_MM`].
@@ -75,11 +79,15 @@ impl World {
             .map(|p| of_shapes[p.shape].clone())
             .collect();
         let flats = (0..count).map(|p| flats(assembly.surfaces(p)).into()).collect();
+        let of_shapes: Vec<Arc<[PlaneRegion]>> = (0..count)
+            .map(|p| regions(assembly.body(p).surface().shape(), assembly.surfaces(p)).into())
+            .collect();
         let mut world = Self {
             assembly,
             home,
             ports,
             flats,
+            regions: of_shapes,
             kinds,
             joined: vec![vec![false; count]; count],
             diagonal: low.distance(high),
@@ -90,7 +98,7 @@ impl World {
         }
         for a in 0..count {
             for b in a + 1..count {
-                let near = world.assembly.pair_gap(a, b, NEAR_MM).is_some();
+                let near = world.assembly.are_within(a, b, NEAR_MM);
                 if near || !world.fits_between(a, b).is_empty() {
                     world.join([a, b]);
                 }
@@ -203,6 +211,11 @@ impl World {
         &self.flats[part]
     }
 
+    /// The larger flats of a part with their regions, in its own frame, largest first.
+    pub fn regions(&self, part: usize) -> &[PlaneRegion] {
+        &self.regions[part]
+    }
+
     /// Size of the assembly in the file, mm.
     pub fn diagonal(&self) -> f64 {
         self.diagonal
@@ -264,13 +277,25 @@ impl World {
         flange::joined(of(a), of(b))
     }
 
-    /// Whether two parts are connected now: ports in one another, a flange, or placed to each other as in a file that has them in contact.
+    /// The normal of a flat of `a` that lies on a flat of `b` now.
+    pub fn laid(&self, a: usize, b: usize) -> Option<DVec3> {
+        let of = |part: usize| (self.regions(part), self.placement(part));
+        laid(of(a), of(b))
+    }
+
+    /// Whether two parts are connected now: ports in one another, a flange, a flat on a flat, or placed to each other as in a file that has them in contact.
     pub fn connected(&self, a: usize, b: usize) -> bool {
+        if !self.assembly.boxes_are_near(a, b, NEAR_MM) {
+            return false;
+        }
         let as_at_home = self.joined[a][b] && {
             let wanted = self.placement(b) * self.home[b].inverse() * self.home[a];
             self.same(a, &self.placement(a), &wanted)
         };
-        as_at_home || !self.fits_between(a, b).is_empty() || self.flange(a, b).is_some()
+        as_at_home
+            || !self.fits_between(a, b).is_empty()
+            || self.flange(a, b).is_some()
+            || self.laid(a, b).is_some()
     }
 
     /// Parts connected to `a` now.
@@ -307,26 +332,42 @@ impl World {
         };
         let (share, pair) =
             self.assembly
-                .touch_share(&group, &near, &Motion::slide(direction * limit), STEP_MM);
+                .touch_share_by_cores(&group, &near, &Motion::slide(direction * limit), STEP_MM);
         (share * limit, pair)
     }
 
-    /// As [`Self::travel`], found to `COARSE_MM` only: for questions whether a way is free. A way blocked at its start costs little.
+    /// As [`Self::travel`], found to `COARSE_MM` only: for questions whether a way is free. A way blocked at its start costs little, and has no free travel.
     pub fn free(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
         let group = Moved {
             parts: &self.all_moving(moving),
             by: DAffine3::IDENTITY,
         };
-        for length in [START_MM.min(limit), limit] {
-            let near = self.on_the_way(moving, direction, length);
-            let step = COARSE_MM.min(length / 2.0);
-            let motion = Motion::slide(direction * length);
-            let (share, pair) = (self.assembly).free_share_by_cores(&group, &near, &motion, step);
-            if pair.is_some() {
-                return (share * length, pair);
-            }
+        let start = START_MM.min(limit);
+        let started = Moved {
+            by: DAffine3::from_translation(direction * start),
+            ..group
+        };
+        let near = self.on_the_way(moving, direction, start);
+        if let Some((_, pair)) = self.assembly.excess(&started, &near, 0.0) {
+            return (0.0, Some(pair));
         }
-        (limit, None)
+        let near = self.on_the_way(moving, direction, limit);
+        let step = COARSE_MM.min(limit / 2.0);
+        let motion = Motion::slide(direction * limit);
+        let (share, pair) = (self.assembly).free_share_by_cores(&group, &near, &motion, step);
+        (share * limit, pair)
+    }
+
+    /// Travel of `moving` along the unit vector `direction`, from `from` to at most `limit` mm, until its box meets that of another part.
+    pub fn room_mm(&self, moving: &[usize], direction: DVec3, from: f64, limit: f64) -> f64 {
+        let own = self
+            .assembly
+            .bounds_of(&self.all_moving(moving), DAffine3::IDENTITY);
+        (self.others(moving).into_iter())
+            .filter_map(|other| meeting(own, self.bounds(other), direction))
+            .filter(|(_, end)| *end > from)
+            .map(|(start, _)| start.max(from))
+            .fold(limit, f64::min)
     }
 
     /// Parts whose boxes meet the box of the motion.
@@ -351,19 +392,28 @@ impl World {
             by: DAffine3::IDENTITY,
         };
         self.assembly
-            .touch_share(&group, &self.others(&moving), motion, STEP_MM)
+            .touch_share_by_cores(&group, &self.others(&moving), motion, STEP_MM)
     }
 
-    /// A part that overlaps `part` where it is now.
-    pub fn blocker(&self, part: usize) -> Option<Clearance> {
+    /// The deepest overlap of `part` and what moves with it where they are now, however small.
+    pub fn overlap(&self, part: usize) -> Option<Clearance> {
         let moving = self.all_moving(&[part]);
-        self.assembly.blocker(
-            &Moved {
-                parts: &moving,
-                by: DAffine3::IDENTITY,
-            },
-            &self.others(&moving),
-        )
+        let group = Moved {
+            parts: &moving,
+            by: DAffine3::IDENTITY,
+        };
+        self.assembly.clearance(&group, &self.others(&moving), 0.0, false)
+    }
+
+    /// A part that overlaps `part`, or what moves with it, by more than contact where they are now.
+    pub fn blocker(&self, part: usize) -> Option<usize> {
+        let moving = self.all_moving(&[part]);
+        let group = Moved {
+            parts: &moving,
+            by: DAffine3::IDENTITY,
+        };
+        let blocks = |&other: &usize| self.assembly.excess(&group, &[other], 0.0).is_some();
+        self.others(&moving).into_par_iter().find_first(blocks)
     }
 
     /// Shortest travel along `direction` at which the box of `moving` is apart from the boxes of `from`, mm.
@@ -374,24 +424,7 @@ impl World {
         // Stretches of the travel in which the boxes meet.
         let mut meets: Vec<(f64, f64)> = Vec::new();
         for &other in from {
-            let (l, h) = self.bounds(other);
-            let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
-            for axis in 0..3 {
-                let d = direction[axis];
-                let (gap_low, gap_high) = (l[axis] - high[axis], h[axis] - low[axis]);
-                if d.abs() < 1e-9 {
-                    if gap_low > 0.0 || gap_high < 0.0 {
-                        (start, end) = (1.0, 0.0);
-                    }
-                } else {
-                    let (a, b) = (gap_low / d, gap_high / d);
-                    start = f64::max(start, a.min(b));
-                    end = f64::min(end, a.max(b));
-                }
-            }
-            if end > start && end > 0.0 {
-                meets.push((start, end));
-            }
+            meets.extend(meeting((low, high), self.bounds(other), direction).filter(|(_, end)| *end > 0.0));
         }
         meets.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut at = 0.0;
@@ -405,7 +438,7 @@ impl World {
     }
 
     /// Directions in which a part may leave: axes of its connected ports, normals and axes of its contacts, normals of
-    /// its flanges, and the file's axes; both ways.
+    /// its flanges and of flats that lie on each other, and the file's axes; both ways.
     pub fn ways(&self, part: usize) -> Vec<DVec3> {
         let mut ways: Vec<DVec3> = Vec::new();
         let mut add = |d: DVec3| {
@@ -428,8 +461,9 @@ impl World {
             }
         }
         for other in (0..self.count()).filter(|&other| other != part) {
-            if let Some(normal) = self.flange(part, other) {
-                add(normal);
+            if self.assembly.boxes_are_near(part, other, NEAR_MM) {
+                let normal = self.flange(part, other).or_else(|| self.laid(part, other));
+                normal.map(&mut add);
             }
         }
         for axis in DVec3::AXES {
@@ -446,6 +480,25 @@ impl World {
             self.set_placement(part, moved);
         }
     }
+}
+
+/// Stretch of the travel of a box along `direction` in which it meets another box; `None` where it never does.
+fn meeting((low, high): (DVec3, DVec3), (l, h): (DVec3, DVec3), direction: DVec3) -> Option<(f64, f64)> {
+    let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
+    for axis in 0..3 {
+        let d = direction[axis];
+        let (gap_low, gap_high) = (l[axis] - high[axis], h[axis] - low[axis]);
+        if d.abs() < 1e-9 {
+            if gap_low > 0.0 || gap_high < 0.0 {
+                return None;
+            }
+        } else {
+            let (a, b) = (gap_low / d, gap_high / d);
+            start = f64::max(start, a.min(b));
+            end = f64::min(end, a.max(b));
+        }
+    }
+    (end > start).then_some((start, end))
 }
 
 /// The first shape that is equal to shape `index` in its own frame: same faces, volume, area and centre of mass.
