@@ -2,7 +2,7 @@
 //!
 //! Seats, in this order: the part's own place against b in the file; places there of equal parts, nearest first; such a place carried over to an equal
 //! bore of b; then ports of a and b that match in diameter ([`crate::matching`]); then flats on each other with bores in line ([`crate::flange`]);
-//! where no shaft, bore or bores in line fit and the part is not to go inside, then flat on flat ([`crate::plane_seats`]). A filled seat overlaps the part in it and is passed over. The way
+//! where no shaft, bore or bores in line fit and the part is not to go inside, then flat on flat ([`crate::plane_port`]). A filled seat overlaps the part in it and is passed over. The way
 //! in is the way out backwards, straight, from the side asked for.
 
 use glam::{DAffine3, DVec3};

@@ -1,4 +1,4 @@
-//! Places of a part that lies on another by plane ports alone: no shaft, bore or pattern of bores states where.
+//! Places of a part on another by plane ports ([`crate::plane_port`]) alone: no shaft, bore or pattern of bores states where.
 //!
 //! Snap policy (Jung 2003, section 4): the largest common area, then the smallest rotation, then the nearest flat. The middle of one flat lies on the middle of the
 //! other, and their longest edges are parallel or perpendicular.
@@ -6,54 +6,18 @@
 use std::cmp::Ordering;
 use std::f64::consts::FRAC_PI_2;
 
-use glam::{DAffine3, DQuat, DVec3};
-use mortise_brep::Shape;
-use mortise_mating::{MergedSurface, PlaneRegion, plane_regions};
+use glam::{DAffine3, DQuat};
+use mortise_mating::PlaneRegion;
 
-use crate::flange::{ON_MM, PARALLEL};
 use crate::world::World;
 
-/// Most flats of a part, the largest.
-const MOST_FLATS: usize = 12;
 /// Least share of the part's largest flat that a flat has by which the part is laid, and least share of it that lies on the other flat.
 const LARGE: f64 = 0.5;
 const COMMON: f64 = 0.9;
 /// Largest area of the other flat over that of the part's: the middle of a larger one is no place.
 const RATIO: f64 = 2.0;
-/// Least common share of the smaller of two flats that lie on each other.
-const LIES: f64 = 0.5;
 /// Most places returned.
 const MOST: usize = 16;
-
-/// The flats of a part, largest first, in its frame.
-pub fn regions(shape: &Shape, surfaces: &[MergedSurface]) -> Vec<PlaneRegion> {
-    let mut all = plane_regions(shape, surfaces);
-    all.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
-    all.truncate(MOST_FLATS);
-    all
-}
-
-/// A part's flats and its placement.
-pub type Laid<'a> = (&'a [PlaneRegion], DAffine3);
-
-/// The normal of a flat of the first part that lies on a flat of the second.
-pub fn laid((flats, by): Laid<'_>, (others, base): Laid<'_>) -> Option<DVec3> {
-    let to_own = by.inverse() * base;
-    let on = |p: &PlaneRegion, q: &PlaneRegion| {
-        let (normal, offset) = (
-            to_own.transform_vector3(q.normal),
-            to_own.transform_point3(q.middle) - p.middle,
-        );
-        p.normal.dot(normal) < 0.0
-            && p.normal.cross(normal).length() <= PARALLEL
-            && offset.dot(p.normal).abs() <= ON_MM
-            && offset.length() < p.reach_mm + q.reach_mm
-            && p.common_mm2(q, &to_own) >= LIES * p.area_mm2.min(q.area_mm2)
-    };
-    (flats.iter())
-        .find(|p| others.iter().any(|q| on(p, q)))
-        .map(|p| by.transform_vector3(p.normal))
-}
 
 /// Places of `part` with one of its large flats wholly on a flat of `into` of a similar size, the best first. Overlap is not checked.
 ///

@@ -9,7 +9,7 @@ use mortise_task::{Assembly, Clearance, Motion, Moved, TaskError};
 use rayon::prelude::*;
 
 use crate::flange::{self, Flat, flats};
-use crate::plane_seats::{laid, regions};
+use crate::plane_port::{laid, regions};
 use crate::port::{Port, ports};
 
 /// Distance within which two placements are the same, mm at the corners of the part's box: well below the micrometre promised.
