@@ -3,11 +3,12 @@
 //! Samples inside faces are as dense as a chord error of [`SAMPLE_ERROR_MM`] requires, samples along edges no farther apart than a share of the shape's
 //! size. Lengths are mm, in the shape's frame. Cost: sampling is proportional to area over spacing²; a tree over n samples has 2n − 1 nodes.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use mortise_bake::{ExactSurface, Nearest, PointshellOptions, sample_pointshell};
-use mortise_brep::{Curve, Face, Shape, Surface};
+use mortise_brep::{Curve, Face, Frame, Shape, Surface};
 
 use crate::kept::Kept;
+use crate::motion::Motion;
 use crate::work::work;
 
 /// Chord error between neighbouring samples inside a face, mm.
@@ -25,8 +26,9 @@ const COARSE_SHARE: f64 = 1.0 / 40.0;
 /// Time of a query of the exact surface in visits of a sphere.
 const NEAREST_WORK: u64 = 20;
 
-/// Largest sine of the angle between what is parallel: 1e-7 mm over 100 mm.
+/// Largest sine of the angle between what is parallel: 1e-7 mm over 100 mm; and distance from an axis of what is on it, mm.
 const PARALLEL: f64 = 1e-9;
+const ON_AXIS_MM: f64 = 1e-7;
 
 /// Distance below which the line to the nearest point has no reliable direction, mm.
 const ON_SURFACE_MM: f64 = 1e-6;
@@ -40,7 +42,7 @@ pub struct Sample {
     pub normal: Option<DVec3>,
     /// Face it lies on (one of them on an edge).
     pub face: u32,
-    /// What it is inside of: number of the face, or of the straight edge counted after the faces; `u32::MAX` elsewhere.
+    /// What it is inside of: number of the face, or of the edge counted after the faces; `u32::MAX` elsewhere.
     inside: u32,
     spacing: Spacing,
 }
@@ -67,7 +69,7 @@ pub(crate) struct Node {
     pub first: u32,
     /// Second child; `u32::MAX` for a leaf.
     pub second: u32,
-    /// Face or straight edge inside which all of its samples are, as [`Sample::inside`].
+    /// Face or edge inside which all of its samples are, as [`Sample::inside`].
     pub inside: u32,
 }
 
@@ -203,20 +205,41 @@ impl Body {
         })
     }
 
-    /// Of each face whether it is a plane or cylinder along `direction`, and then of each edge whether it is straight along it.
-    pub(crate) fn along(&self, direction: DVec3) -> Vec<bool> {
-        let direction = direction.normalize_or_zero();
+    /// Of each face and then of each edge whether a motion carries it along itself, with the body placed by `pose`: planes, cylinders and straight edges along a
+    /// slide; surfaces of revolution and circles about the axis of a turn; cylinders about the axis of a screw.
+    pub(crate) fn carried_along(&self, motion: &Motion, pose: &DAffine3) -> Vec<bool> {
         let shape = self.surface.shape();
-        let faces = shape.faces.iter().map(|face| match face.surface {
-            Surface::Plane { frame } => frame.z.dot(direction).abs() <= PARALLEL,
-            Surface::Cylinder { frame, .. } => frame.z.cross(direction).length() <= PARALLEL,
-            _ => false,
-        });
-        let edges = shape.edges.iter().map(|edge| match edge.curve {
-            Curve::Line { direction: own, .. } => own.cross(direction).length() <= PARALLEL,
-            _ => false,
-        });
-        faces.chain(edges).collect()
+        let back = pose.inverse();
+        let (slide, axis) = (
+            back.transform_vector3(motion.slide).normalize_or_zero(),
+            back.transform_vector3(motion.axis),
+        );
+        let point = back.transform_point3(motion.point);
+        let (slides, turns) = (slide != DVec3::ZERO, motion.angle != 0.0);
+        if slides && turns && slide.cross(axis).length() > PARALLEL {
+            return Vec::new();
+        }
+        let is_parallel = |d: DVec3, to: DVec3| d.cross(to).length() <= PARALLEL;
+        let is_on_axis = |p: DVec3| (p - point).reject_from_normalized(axis).length() <= ON_AXIS_MM;
+        let is_about = |frame: &Frame| is_parallel(frame.z, axis) && is_on_axis(frame.origin);
+        let of_face = |surface: &Surface| match surface {
+            Surface::Plane { frame } if turns => !slides && is_parallel(frame.z, axis),
+            Surface::Plane { frame } => frame.z.dot(slide).abs() <= PARALLEL,
+            Surface::Cylinder { frame, .. } if turns => is_about(frame),
+            Surface::Cylinder { frame, .. } => is_parallel(frame.z, slide),
+            Surface::Cone { frame, .. } | Surface::Torus { frame, .. } => turns && !slides && is_about(frame),
+            Surface::Sphere { frame, .. } => turns && !slides && is_on_axis(frame.origin),
+            Surface::Spline => false,
+        };
+        let of_edge = |curve: &Curve| match curve {
+            Curve::Line { direction, .. } => !turns && is_parallel(*direction, slide),
+            Curve::Circle { frame, .. } => turns && !slides && is_about(frame),
+            Curve::Other => false,
+        };
+        let faces = shape.faces.iter().map(|face| of_face(&face.surface));
+        faces
+            .chain(shape.edges.iter().map(|edge| of_edge(&edge.curve)))
+            .collect()
     }
 
     /// Direction in which the signed distance of `p` grows, unit length: from its nearest point, or the face's normal where it lies on the surface; zero
@@ -324,7 +347,7 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
     let shape = surface.shape();
     for (number, edge) in shape.edges.iter().enumerate() {
         let Some(&face) = edge.faces.first() else { continue };
-        for pair in edge.polyline.windows(2) {
+        for (piece, pair) in edge.polyline.windows(2).enumerate() {
             let steps = (pair[0].distance(pair[1]) / along).ceil().clamp(1.0, 1e4) as usize;
             for i in 0..steps {
                 let chord = pair[0].lerp(pair[1], i as f64 / steps as f64);
@@ -342,9 +365,11 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
                     position,
                     normal: None,
                     face,
-                    inside: match edge.curve {
-                        Curve::Line { .. } if i > 0 => (shape.faces.len() + number) as u32,
-                        _ => u32::MAX,
+                    // Its first sample is a corner.
+                    inside: if piece > 0 || i > 0 {
+                        (shape.faces.len() + number) as u32
+                    } else {
+                        u32::MAX
                     },
                     spacing: match edge.curve {
                         Curve::Line { .. } => Spacing::Line,

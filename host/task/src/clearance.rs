@@ -331,8 +331,8 @@ struct Sweep<'a> {
     limits: &'a Limits,
     /// Bits of the share at which something has met.
     earliest: &'a AtomicU64,
-    /// Faces and edges of either body along a slide: samples inside follow those of the leading end on the same lines, so that they need a check at the start
-    /// alone.
+    /// Faces and edges of either body that the motion carries along themselves: samples inside follow those of the leading end on the same lines, so that they need
+    /// a check at the start alone.
     following: [Vec<bool>; 2],
 }
 
@@ -344,12 +344,7 @@ impl<'a> Sweep<'a> {
         limits: &'a Limits,
         earliest: &'a AtomicU64,
     ) -> Self {
-        let following = [a, b].map(|of| {
-            if motion.angle != 0.0 {
-                return Vec::new();
-            }
-            of.body.along(of.pose.inverse().transform_vector3(motion.slide))
-        });
+        let following = [a, b].map(|of| of.body.carried_along(motion, &of.pose));
         Self {
             a,
             b,
@@ -360,7 +355,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Whether all samples of a node are inside a face or edge that lies along the slide.
+    /// Whether all samples of a node are inside a face or edge that the motion carries along itself.
     fn follows(&self, node: &Node, way: Way) -> bool {
         let of = &self.following[usize::from(way == Way::Back)];
         of.get(node.inside as usize).copied().unwrap_or(false)

@@ -4,7 +4,7 @@ mod support;
 
 use std::sync::OnceLock;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use mortise_task::{Assembly, Motion, Moved, SEARCH_STEP_MM};
 use proptest::prelude::*;
 
@@ -20,6 +20,18 @@ fn pair() -> &'static (Assembly, DAffine3) {
         let by = DAffine3::from_translation((middle(0) - middle(1)) * DVec3::Z);
         (assembly, by)
     })
+}
+
+/// The lock of the shared parts, its key second.
+fn lock() -> Option<&'static Assembly> {
+    static LOCK: OnceLock<Option<Assembly>> = OnceLock::new();
+    let load = || {
+        Some(support::load(
+            &support::shared("lock")?,
+            "10_extraction/lock_maze.step",
+        ))
+    };
+    LOCK.get_or_init(load).as_ref()
 }
 
 fn gap(shift: DVec3, exact: bool) -> f64 {
@@ -89,6 +101,36 @@ proptest! {
         }
         prop_assert_eq!(met.is_none(), share == 1.0);
         prop_assert!(met.is_none() || (0..=8).any(|i| !clear((share + step * f64::from(i) / 8.0).min(1.0))), "{share}");
+    }
+
+    /// A key between wards and in their keyholes, whose faces lie about one axis: turns and slides end where poses on them begin to overlap.
+    #[test]
+    fn a_key_turns_until_its_poses_overlap(
+        chamber in 0..4usize, angle in -3.2..3.2f64, within in 0.0..1.0f64, in_ward: bool, slides: bool, by in prop_oneof![-6.0..-0.1f64, 0.1..6.0f64]
+    ) {
+        let Some(assembly) = lock() else { return Ok(()) };
+        const WARDS: [f64; 4] = [75.0, -40.0, 140.0, 20.0];
+        const PITCH_MM: f64 = 7.3;
+        let (angle, height) = if in_ward { (WARDS[chamber].to_radians(), within) } else { (angle, 0.0) };
+        let start = DAffine3::from_rotation_translation(DQuat::from_rotation_z(angle), PITCH_MM * (chamber as f64 + height) * DVec3::Z);
+        let group = Moved { parts: &[1], by: start };
+        let (motion, length) = if slides {
+            (Motion::slide(by * DVec3::Z), by.abs())
+        } else {
+            // The bit ends 12.2 mm from the axis.
+            (Motion::turn(DVec3::ZERO, DVec3::Z, by), 12.2 * by.abs())
+        };
+        let step_mm = 0.25;
+        let (share, met) = assembly.free_share(&group, &[0], &motion, step_mm);
+        let clear = |t: f64| assembly.clear(&Moved { parts: &[1], by: motion.at(t) * group.by }, &[0]);
+        let step = step_mm / length;
+        for i in 0..32 {
+            let t = (share - step) * f64::from(i) / 31.0;
+            prop_assert!(share <= step || clear(t), "{t} of {share}");
+        }
+        prop_assert_eq!(met.is_none(), share == 1.0);
+        prop_assert!(met.is_none() || (0..=8).any(|i| !clear((share + step * f64::from(i) / 8.0).min(1.0))), "{share}");
+        prop_assert_eq!(assembly.free_share_by_cores(&group, &[0], &motion, step_mm), (share, met));
     }
 
     /// By all cores a motion ends where it ends by one, to the bit.
