@@ -1,6 +1,7 @@
 //! The assembly as it stands during a session: placements, ports, connections, and free travel by the exact distance.
 
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
@@ -53,6 +54,8 @@ pub struct World {
     /// Pairs together in the file: in contact, a shaft in a bore, or within [`NEAR_MM`].
     joined: Vec<Vec<bool>>,
     diagonal: f64,
+    /// Of pairs that were near: the second's place in the first's frame, and whether they are connected there.
+    known: Mutex<HashMap<[usize; 2], (DAffine3, bool)>>,
     /// A part, and the parts that move with it, while they are attached to it.
     attached: Option<(usize, Vec<usize>)>,
 }
@@ -91,6 +94,7 @@ impl World {
             kinds,
             joined: vec![vec![false; count]; count],
             diagonal: low.distance(high),
+            known: Mutex::default(),
             attached: None,
         };
         for contact in world.assembly.contacts.clone() {
@@ -263,7 +267,7 @@ impl World {
     /// Connected ports of a part with all others, the longest common interval first.
     pub fn fits(&self, a: usize) -> Vec<Fit> {
         let mut fits: Vec<Fit> = (0..self.count())
-            .filter(|&b| b != a)
+            .filter(|&b| b != a && self.assembly.boxes_are_near(a, b, NEAR_MM))
             .flat_map(|b| self.fits_between(a, b))
             .collect();
         let area = |f: &Fit| (f.common.1 - f.common.0) * f.port.radius;
@@ -288,6 +292,19 @@ impl World {
         if !self.assembly.boxes_are_near(a, b, NEAR_MM) {
             return false;
         }
+        let place = self.placement(a).inverse() * self.placement(b);
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((there, connected)) = known.get(&[a, b])
+            && *there == place
+        {
+            return *connected;
+        }
+        let connected = self.are_connected(a, b);
+        known.insert([a, b], (place, connected));
+        connected
+    }
+
+    fn are_connected(&self, a: usize, b: usize) -> bool {
         let as_at_home = self.joined[a][b] && {
             let wanted = self.placement(b) * self.home[b].inverse() * self.home[a];
             self.same(a, &self.placement(a), &wanted)
