@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use mortise_brep::LoadOptions;
-use mortise_output::lines;
+use mortise_output::{Existing, Output, lines};
 use mortise_task::removal::{Budget, Removal, remove};
 use mortise_task::report::{self, Sense, SequenceReport};
 use mortise_task::sequence::{self, Sequence, Step};
@@ -41,9 +41,9 @@ pub struct FeaturesArgs {
     json: bool,
 }
 
-/// Arguments of `assemble`.
+/// Arguments of a search.
 #[derive(Debug, clap::Args)]
-pub struct AssembleArgs {
+pub struct SearchArgs {
     /// STEP file of an assembly, parts in their final places
     file: PathBuf,
     /// Limit on the time of the search, in seconds
@@ -56,11 +56,24 @@ pub struct AssembleArgs {
     json: bool,
 }
 
+/// Arguments of `assemble`.
+#[derive(Debug, clap::Args)]
+pub struct AssembleArgs {
+    #[command(flatten)]
+    search: SearchArgs,
+    /// Page (HTML) to write, with the order, a picture of each step, and clearances
+    #[arg(long, value_name = "PAGE")]
+    report: Option<PathBuf>,
+    /// Replace an existing page
+    #[arg(long, requires = "report")]
+    force: bool,
+}
+
 /// Arguments of `disassemble`.
 #[derive(Debug, clap::Args)]
 pub struct DisassembleArgs {
     #[command(flatten)]
-    search: AssembleArgs,
+    search: SearchArgs,
     /// Take out this part alone, the others in place [default: take everything apart]
     #[arg(long, value_name = "PART")]
     part: Option<String>,
@@ -129,10 +142,25 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
 
 /// Runs `assemble`.
 pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
-    let assembly = read(&args.file, &args.reading)?;
+    // A search of a minute is not for a file that cannot be written.
+    let existing = Existing::from_force(args.force);
+    let output = |path: &PathBuf| Output::new(path, existing, &[&args.search.file]);
+    let output = args.report.as_ref().map(output).transpose()?;
+    let assembly = read(&args.search.file, &args.search.reading)?;
     let all: Vec<usize> = (0..assembly.count()).collect();
-    let found = sequence::disassemble(&assembly, &all, Duration::from_secs(args.time));
-    print_sequence(&report::sequence(&assembly, &found, Sense::Assembly), args.json)
+    let found = sequence::disassemble(&assembly, &all, Duration::from_secs(args.search.time));
+    if let Some(output) = output {
+        let title = args
+            .search
+            .file
+            .file_stem()
+            .map_or("assembly".into(), |name| name.to_string_lossy());
+        output.write(mortise_page::page(&title, &assembly, &found).as_bytes())?;
+    }
+    print_sequence(
+        &report::sequence(&assembly, &found, Sense::Assembly),
+        args.search.json,
+    )
 }
 
 /// Runs `disassemble`.

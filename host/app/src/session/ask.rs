@@ -21,6 +21,7 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
         Purpose::OpenModel => Intent::Open(path),
         Purpose::SaveProject => Intent::WriteProject { path, replace },
         Purpose::SaveTraces => Intent::SaveTraces { path, replace },
+        Purpose::SaveSteps => Intent::WriteSteps { path, replace },
         Purpose::OpenRun => Intent::Run(RunIntent::Open(path)),
         Purpose::CompareRun => Intent::Run(RunIntent::Compare(path)),
         Purpose::SaveRunReport => Intent::Run(RunIntent::WriteReport { path, replace }),

@@ -114,6 +114,15 @@ pub enum Intent {
     FindSequence,
     /// Cancel the search for them.
     CancelSequence,
+    /// Ask for the file for a report of the steps.
+    SaveSteps,
+    /// Write a report of the steps.
+    WriteSteps {
+        /// File to write.
+        path: PathBuf,
+        /// Whether an existing file may be replaced.
+        replace: bool,
+    },
     /// Put the parts where they are after so many of these steps.
     GoToStep {
         /// Number of steps done, with a share of the next one.
@@ -194,6 +203,8 @@ impl Intent {
                 | Self::TurnOver
                 | Self::FollowFit
                 | Self::DropFits
+                | Self::SaveSteps
+                | Self::WriteSteps { .. }
                 | Self::SaveProject
                 | Self::WriteProject { .. }
                 | Self::ForgetRecent(_)
@@ -336,7 +347,11 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         | Intent::TurnOver
         | Intent::FollowFit
         | Intent::PlaceFit => fits(session, intent),
-        Intent::FindSequence | Intent::CancelSequence | Intent::GoToStep { .. } => sequence(session, intent),
+        Intent::FindSequence
+        | Intent::CancelSequence
+        | Intent::SaveSteps
+        | Intent::WriteSteps { .. }
+        | Intent::GoToStep { .. } => sequence(session, intent),
         Intent::SaveProject | Intent::WriteProject { .. } => {
             session.document.is_none().then(|| NO_FILE.to_owned())
         }
@@ -395,6 +410,7 @@ fn sequence(session: &Session, intent: &Intent) -> Option<String> {
         (Some(document), Intent::FindSequence) if document.model.parts.len() < 2 => "One part is no assembly",
         (Some(_), Intent::FindSequence) => return None,
         (Some(document), _) if sequencing.found(document).is_none() => "Find the steps first",
+        (Some(_), Intent::SaveSteps | Intent::WriteSteps { .. }) => return None,
         _ => session.no_move()?,
     };
     Some(reason.to_owned())

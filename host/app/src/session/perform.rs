@@ -112,6 +112,8 @@ impl Session {
             Intent::DropFits => self.drop_fits(),
             Intent::FindSequence => self.find_sequence(),
             Intent::CancelSequence => self.sequencing.cancel(),
+            Intent::SaveSteps => self.ask_for_path(Purpose::SaveSteps),
+            Intent::WriteSteps { path, replace } => self.write_steps(path, replace),
             Intent::GoToStep { done, goes_on } => self.go_to_step(done, goes_on),
             Intent::SaveProject => self.ask_for_path(Purpose::SaveProject),
             Intent::WriteProject { path, replace } => self.write_project(path, replace),

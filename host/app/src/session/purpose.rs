@@ -9,6 +9,8 @@ pub enum Purpose {
     SaveTraces,
     /// The file for a project.
     SaveProject,
+    /// The file for a report of the steps of an assembly.
+    SaveSteps,
     /// A recorded run to show.
     OpenRun,
     /// A recorded run to compare with.
@@ -32,6 +34,7 @@ impl Purpose {
             Self::OpenModel => "Open STEP file or project",
             Self::SaveProject => "Save project as",
             Self::SaveTraces => "Export traces as CSV",
+            Self::SaveSteps => "Save report of the steps as",
             Self::OpenRun => "Open recorded run",
             Self::CompareRun => "Compare with recorded run",
             Self::SaveRunReport => "Save report of the runs as",
@@ -57,6 +60,7 @@ impl Purpose {
             Self::SaveTraces => "/folder/traces.csv",
             Self::SaveProject => "/folder/assembly.mortise",
             Self::SaveRunReport => "/folder/run-1.html",
+            Self::SaveSteps => "/folder/assembly.html",
             Self::OpenFirmware => "/folder/nucleo-h743zi",
             Self::OpenRig | Self::SaveRig => "/folder/rig.toml",
             Self::SaveRigReport => "/folder/commissioning.md",
@@ -69,6 +73,7 @@ impl Purpose {
         match self {
             Self::OpenModel | Self::OpenFirmware | Self::OpenRig | Self::OpenRun | Self::CompareRun => "",
             Self::SaveRunReport => "run.html",
+            Self::SaveSteps => "assembly.html",
             Self::SaveRig => "rig.toml",
             Self::SaveRigReport => "commissioning.md",
             Self::SaveTraces => "traces.csv",
@@ -85,7 +90,7 @@ impl Purpose {
             ),
             Self::SaveTraces => ("CSV", &["csv"]),
             Self::SaveProject => ("Mortise projects", &["mortise"]),
-            Self::SaveRunReport => ("Pages", &["html"]),
+            Self::SaveRunReport | Self::SaveSteps => ("Pages", &["html"]),
             // What the linker makes has no ending.
             Self::OpenFirmware => ("Firmware", &["*"]),
             Self::OpenRig | Self::SaveRig => ("Descriptions of rigs", &["toml"]),

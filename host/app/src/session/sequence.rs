@@ -3,6 +3,8 @@
 //! Parts that are not yet put on stand at the end of their way, far enough from one another to be seen: a part stands farther out than its way leads where it
 //! would be within another part's box there. A group that is put on as one is itself apart before its own steps are done. Lengths are mm.
 
+use std::sync::Arc;
+
 use glam::{DAffine3, DVec3};
 use mortise_task::report::{self, Sense};
 use mortise_task::sequence::Sequence as Found;
@@ -41,6 +43,8 @@ pub struct Sequence {
     pub verdict: String,
     /// Parts that do not come apart and what holds them, in words.
     pub stuck: Vec<String>,
+    /// Report as a page (HTML).
+    pub page: Arc<str>,
     /// Poses in the file.
     file: Vec<DAffine3>,
     /// Radius of the assembly.
@@ -94,6 +98,7 @@ impl Sequence {
             steps,
             verdict,
             stuck: report.stuck.iter().map(|stuck| stuck.words()).collect(),
+            page: Arc::default(),
             file: all.iter().map(|part| assembly.placement(*part)).collect(),
             radius,
         }

@@ -1,11 +1,13 @@
 //! Searching the steps in which the open assembly goes together, beside the window's thread, and putting the parts where they are at one of them.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use mortise_brep::CadModel;
 use mortise_task::{Assembly, sequence};
 
+use super::ask::write;
 use super::outbox::Update;
 use super::sequence::Sequence;
 use super::sequencing::SequenceFound;
@@ -23,10 +25,19 @@ impl Session {
         let Some(document) = &self.document else { return };
         let id = self.sequencing.begin(document.generation);
         let (model, outbox) = (Arc::clone(&document.model), self.outbox.clone());
+        let title = document.title.clone();
         spawn("mortise-sequence", move || {
-            let result = search(&model);
+            let result = search(&title, &model);
             outbox.send(Update::Sequence(SequenceFound { id, result }));
         });
+    }
+
+    /// Writes the report of the steps, which must be known.
+    pub(super) fn write_steps(&self, path: PathBuf, replace: bool) {
+        let found = (self.document.as_ref()).and_then(|document| self.sequencing.found(document));
+        if let Some(found) = found {
+            write(&self.outbox, path, replace, found.page.to_string());
+        }
     }
 
     /// Puts the parts where they are after so many steps, which must be possible, and selects what is put on next.
@@ -55,10 +66,12 @@ impl Session {
     }
 }
 
-/// The steps of a model. Cost: seconds, at most [`LONGEST`] and some.
-fn search(model: &CadModel) -> Result<Sequence, String> {
+/// The steps of a model, with their report. Cost: seconds, at most [`LONGEST`] and some.
+fn search(title: &str, model: &CadModel) -> Result<Sequence, String> {
     let assembly = Assembly::new(model.clone()).map_err(|error| error.to_string())?;
     let all: Vec<usize> = (0..assembly.count()).collect();
     let found = sequence::disassemble(&assembly, &all, LONGEST);
-    Ok(Sequence::new(&assembly, &found))
+    let mut sequence = Sequence::new(&assembly, &found);
+    sequence.page = mortise_page::page(title, &assembly, &found).into();
+    Ok(sequence)
 }

@@ -57,6 +57,10 @@ fn request(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             let hint =
                 "Search an order and ways in which the parts go together without overlap, up to a minute";
             control::intent_button(ui, session, wanted, button, Intent::FindSequence, hint);
+            let button = Button::new(RichText::new("Report…").size(12.5));
+            let hint = "Write the order with a picture of each step and the clearances to a page (HTML)";
+            control::intent_button(ui, session, wanted, button, Intent::SaveSteps, hint)
+                .accessible_name("Report of the steps");
         }
         Some(since) => {
             let seconds = since.elapsed().as_secs();

@@ -111,3 +111,40 @@ fn a_hand_takes_a_part_from_where_a_step_has_it_and_no_step_moves_what_it_holds(
     assert!(harness.get_by_label("Together").accesskit_node().is_disabled());
     assert!(harness.get_by_label("Steps done").accesskit_node().is_disabled());
 }
+
+/// *Report…* asks for a file and writes the order with a picture of each step; before the steps are found it says what is missing.
+#[test]
+fn the_steps_are_written_to_a_page() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let why = obstacle(&harness.state().session, &Intent::SaveSteps);
+    assert_eq!(why.as_deref(), Some("Find the steps first"));
+    let mut harness = found();
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = folder.path().join("sample.html");
+    let intent = Intent::WriteSteps {
+        path: page.clone(),
+        replace: false,
+    };
+    harness.get_by_label("Report of the steps");
+    assert_eq!(obstacle(&harness.state().session, &intent), None);
+    harness.state_mut().session.act(intent.clone());
+    until(&mut harness, "the page", |_| page.exists());
+    let text = std::fs::read_to_string(&page).expect("written");
+    assert_eq!(
+        text.matches("data:image/png;base64,").count(),
+        1,
+        "the sample has one step"
+    );
+    assert!(text.contains("2 parts, together in 1 step<"), "{text}");
+    // An existing file is not replaced without being asked.
+    std::fs::write(&page, "mine").expect("a file");
+    harness.state_mut().session.act(intent);
+    until(&mut harness, "the refusal", |session| {
+        session
+            .notes
+            .iter()
+            .any(|note| note.text.contains("exists already"))
+    });
+    assert_eq!(std::fs::read_to_string(&page).expect("kept"), "mine");
+}

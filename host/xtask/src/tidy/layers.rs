@@ -96,6 +96,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     ("host/words", &["mortise-brep", "mortise-mating", "mortise-task"]),
+    ("host/page", &["mortise-brep", "mortise-task"]),
     (
         "host/guide",
         &[
@@ -131,6 +132,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-inspect",
             "mortise-mating",
             "mortise-output",
+            "mortise-page",
             "mortise-protocol",
             "mortise-record",
             "mortise-rig",
