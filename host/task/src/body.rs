@@ -30,6 +30,9 @@ const NEAREST_WORK: u64 = 20;
 const PARALLEL: f64 = 1e-9;
 const ON_AXIS_MM: f64 = 1e-7;
 
+/// Largest share of its speed at which a sample goes outwards and still counts as led.
+const ALONG: f64 = 1e-7;
+
 /// Distance below which the line to the nearest point has no reliable direction, mm.
 const ON_SURFACE_MM: f64 = 1e-6;
 
@@ -44,7 +47,17 @@ pub struct Sample {
     pub face: u32,
     /// What it is inside of: number of the face, or of the edge counted after the faces; `u32::MAX` elsewhere.
     inside: u32,
+    /// Outward unit normals of the faces beside it, one or two; not numbers where there may be more, or one is not known.
+    normals: [DVec3; 2],
     spacing: Spacing,
+}
+
+impl Sample {
+    /// Whether a velocity brings it outwards of a face beside it; else it goes where the body was before.
+    pub(crate) fn leads(&self, velocity: DVec3) -> bool {
+        let most = ALONG * velocity.length();
+        !self.normals.iter().all(|normal| normal.dot(velocity) <= most)
+    }
 }
 
 /// How dense samples of a kind must be.
@@ -259,9 +272,7 @@ impl Body {
 
     /// Outward unit normal of a face at the foot of `p`; `None` for a free-form face.
     pub(crate) fn face_normal(&self, face: u32, p: DVec3) -> Option<DVec3> {
-        let face = self.surface.shape().faces.get(face as usize)?;
-        let (_, natural) = face.surface.distance(p)?;
-        Some(if face.reversed { -natural } else { natural })
+        outward(self.surface.shape(), face, p)
     }
 
     /// Whether the signed distance of `p` exceeds `least`. The distance changes by no more than its point moves, so the distance at the middle of the
@@ -312,6 +323,13 @@ fn bulges(face: &Face) -> bool {
     }
 }
 
+/// Outward unit normal of a face at the foot of `p`; `None` for a free-form face.
+fn outward(shape: &Shape, face: u32, p: DVec3) -> Option<DVec3> {
+    let face = shape.faces.get(face as usize)?;
+    let (_, natural) = face.surface.distance(p)?;
+    Some(if face.reversed { -natural } else { natural })
+}
+
 fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
     let [inside, along] = [
         (size * SHARES[0]).clamp(FACE_SPACING_MM[0], FACE_SPACING_MM[1]),
@@ -341,6 +359,7 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
             Some(_) => u32::from(p.face),
             None => u32::MAX,
         },
+        normals: [normal.unwrap_or(DVec3::NAN); 2],
         spacing,
     })
     .collect();
@@ -370,6 +389,10 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
                         (shape.faces.len() + number) as u32
                     } else {
                         u32::MAX
+                    },
+                    normals: match edge.faces[..] {
+                        [a, b] => [a, b].map(|face| outward(shape, face, position).unwrap_or(DVec3::NAN)),
+                        _ => [DVec3::NAN; 2],
                     },
                     spacing: match edge.curve {
                         Curve::Line { .. } => Spacing::Line,

@@ -334,6 +334,8 @@ struct Sweep<'a> {
     /// Faces and edges of either body that the motion carries along themselves: samples inside follow those of the leading end on the same lines, so that they need
     /// a check at the start alone.
     following: [Vec<bool>; 2],
+    /// Of either body, in its frame: velocity of the slide, angular velocity, and a point of its axis, against the other body, where these stay the same.
+    velocities: [Option<[DVec3; 3]>; 2],
 }
 
 impl<'a> Sweep<'a> {
@@ -345,6 +347,13 @@ impl<'a> Sweep<'a> {
         earliest: &'a AtomicU64,
     ) -> Self {
         let following = [a, b].map(|of| of.body.carried_along(motion, &of.pose));
+        let velocities = [(a, 1.0), (b, -1.0)].map(|(of, sense)| {
+            let back = of.pose.inverse();
+            let vector = |v: DVec3| sense * back.transform_vector3(v);
+            let is_steady = motion.slide.cross(motion.axis * motion.angle) == DVec3::ZERO;
+            let [slide, turn] = [motion.slide, motion.axis * motion.angle].map(vector);
+            is_steady.then(|| [slide, turn, back.transform_point3(motion.point)])
+        });
         Self {
             a,
             b,
@@ -352,6 +361,7 @@ impl<'a> Sweep<'a> {
             limits,
             earliest,
             following,
+            velocities,
         }
     }
 
@@ -359,6 +369,15 @@ impl<'a> Sweep<'a> {
     fn follows(&self, node: &Node, way: Way) -> bool {
         let of = &self.following[usize::from(way == Way::Back)];
         of.get(node.inside as usize).copied().unwrap_or(false)
+    }
+
+    /// Whether a sample goes where its body was before, all the time.
+    fn is_led(&self, s: &Sides<'_>, leaf: &Node, way: Way) -> bool {
+        let Some([slide, turn, point]) = self.velocities[usize::from(way == Way::Back)] else {
+            return false;
+        };
+        let velocity = slide + turn.cross(leaf.center - point);
+        !s.of.samples()[leaf.first as usize].leads(velocity)
     }
 
     fn moved(&self, t: f64) -> Placed<'a> {
@@ -407,15 +426,15 @@ impl<'a> Sweep<'a> {
             work(1);
             let s = &both[usize::from(way == Way::Back)];
             let node = s.of.nodes(self.limits.coarse)[i as usize];
-            let follows = self.follows(&node, way);
-            if follows && from > 0.0 {
+            let is_led = self.follows(&node, way) || node.is_leaf() && self.is_led(s, &node, way);
+            if is_led && from > 0.0 {
                 continue;
             }
             let (p, travel) = self.travel(s, way, i, middle, (to - from) / 2.0);
             if s.within.exceeds(p, node.radius + travel - self.limits.allow_mm) {
                 continue;
             }
-            if follows && node.is_leaf() {
+            if is_led && node.is_leaf() {
                 if self.is_free_at_start(way, node.center) {
                     continue;
                 }
