@@ -187,7 +187,7 @@ enum Run {
 
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 
-const COMMANDS: [(&str, Run); 32] = [
+const COMMANDS: [(&str, Run); 33] = [
     ("cargo xtask setup", Run::Elsewhere("CI, before anything else")),
     ("cargo xtask demo", Run::Elsewhere("the step `window` plays it")),
     (
@@ -253,6 +253,13 @@ const COMMANDS: [(&str, Run); 32] = [
     (
         "mortise assemble FILE",
         Run::Here(&["assemble", SAMPLE, "--json"], "\"assembles\""),
+    ),
+    (
+        "mortise assemble FILE --report PAGE.html",
+        Run::Here(
+            &["assemble", SAMPLE, "--report", "REPORT", "--json"],
+            "\"assembles\"",
+        ),
     ),
     (
         "mortise bake",
@@ -359,6 +366,7 @@ fn every_command_of_the_page_is_run_or_has_its_place() {
     let poses: PathBuf = folder.path().join("poses.csv");
     std::fs::write(&poses, "name,x,y,z,qw,qx,qy,qz\nas drawn,0,0,20,1,0,0,0\n").expect("written");
     let out = folder.path().join("pair.image");
+    let report = folder.path().join("pair.html");
     let manual = folder.path().join("local");
     let headless = Run::Here(
         &["demo", "--headless", "--rig", "sim", "--json"],
@@ -378,6 +386,7 @@ fn every_command_of_the_page_is_run_or_has_its_place() {
         };
         let arguments = arguments.iter().map(|argument| match *argument {
             "OUT" => out.as_os_str(),
+            "REPORT" => report.as_os_str(),
             "POSES" => poses.as_os_str(),
             "MANUAL" => manual.as_os_str(),
             other => other.as_ref(),
