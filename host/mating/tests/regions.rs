@@ -32,7 +32,7 @@ fn lens(r: f64, s: f64, d: f64) -> f64 {
 }
 
 proptest! {
-    /// A ring's area and middle, wherever the plane's frame is.
+    /// A ring's area, middle, normal and reach are those of its circles.
     #[test]
     fn a_ring_has_the_area_of_its_circles(inner in 1.0..5.0f64, width in 0.5..10.0f64, up: bool) {
         let outer = inner + width;

@@ -6,5 +6,5 @@
 mod page;
 mod picture;
 
-pub use page::page;
+pub use page::{escaped, page};
 pub use picture::{Drawn, Picture, picture};

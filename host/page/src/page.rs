@@ -83,7 +83,11 @@ fn verdict(report: &SequenceReport<'_>) -> String {
 
 /// A figure a step.
 fn pictures(page: &mut String, assembly: &Assembly, found: &Sequence, report: &SequenceReport<'_>) {
-    if report.steps.is_empty() || report.steps.len() > MOST_PICTURES {
+    if report.steps.is_empty() {
+        return;
+    }
+    if report.steps.len() > MOST_PICTURES {
+        let _ = writeln!(page, "<p>Without pictures: more than {MOST_PICTURES} steps.</p>");
         return;
     }
     let steps: Vec<&Step> = found.steps.iter().rev().collect();
@@ -153,7 +157,7 @@ fn png(picture: &Picture) -> Vec<u8> {
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     let written = (encoder.write_header()).and_then(|mut writer| writer.write_image_data(&picture.rgb));
-    // Memory takes all that is written; a picture that is not complete would be left out.
+    // Memory takes all that is written.
     written.map_or_else(|_| Vec::new(), |()| file)
 }
 
@@ -180,7 +184,8 @@ fn table(page: &mut String, report: &SequenceReport<'_>) {
     page.push_str("</table>\n");
 }
 
-fn escaped(text: &str) -> String {
+/// Text that HTML takes as it is.
+pub fn escaped(text: &str) -> String {
     text.chars()
         .map(|c| match c {
             '&' => "&amp;".into(),

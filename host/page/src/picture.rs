@@ -55,7 +55,7 @@ pub fn picture(parts: &[Drawn<'_>], way: &[DVec3], [width, height]: [usize; 2]) 
         canvas.edges(part);
     }
     for pair in way.windows(2) {
-        canvas.line(pair[0], pair[1], WAY, f64::INFINITY, 1.0);
+        canvas.line(pair[0], pair[1], WAY, f64::INFINITY, 1);
     }
     canvas.averaged()
 }
@@ -175,21 +175,19 @@ impl Canvas {
             }
             for pair in edge.polyline.windows(2) {
                 let [p, q] = [pair[0], pair[1]].map(|p| part.pose.transform_point3(p));
-                self.line(p, q, INK, self.bias, 0.5);
+                self.line(p, q, INK, self.bias, 0);
             }
         }
     }
 
-    /// A line drawn `bias` nearer than it is, of this half width in samples.
-    fn line(&mut self, from: DVec3, to: DVec3, color: [f64; 3], bias: f64, half: f64) {
+    /// A line drawn `bias` nearer than it is, `reach` samples wide to either side.
+    fn line(&mut self, from: DVec3, to: DVec3, color: [f64; 3], bias: f64, reach: i64) {
         let (a, b) = (self.place(from), self.place(to));
         let steps = (b - a).truncate().abs().max_element().ceil().clamp(1.0, 1e4);
-        let reach = half.floor() as i64;
         for i in 0..=steps as i64 {
             let p = a.lerp(b, i as f64 / steps);
             for (dx, dy) in (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (x, y))) {
-                let depth = if bias.is_finite() { p.z + bias } else { f64::MAX };
-                self.set(p.x as i64 + dx, p.y as i64 + dy, depth, color);
+                self.set(p.x as i64 + dx, p.y as i64 + dy, p.z + bias, color);
             }
         }
     }

@@ -86,3 +86,19 @@ fn what_stays_together_is_said() {
     );
     assert!(pictures(&page).is_empty());
 }
+
+/// A page of very many steps says that it has no pictures.
+#[test]
+fn a_long_page_has_no_pictures() {
+    let (assembly, mut found) = taken_apart("app/samples/pair_d18.75_clear1.00.step", "block");
+    let one = found.steps[0].clone();
+    for (count, drawn) in [(100, 100), (101, 0)] {
+        found.steps = vec![one.clone(); count];
+        let page = page("pair", &assembly, &found);
+        assert_eq!(pictures(&page).len(), drawn);
+        assert_eq!(
+            page.contains("Without pictures: more than 100 steps."),
+            drawn == 0
+        );
+    }
+}

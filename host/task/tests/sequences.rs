@@ -97,6 +97,40 @@ fn interlocked_pairs_stay_together_and_state_by_how_much() {
     }
 }
 
+/// The rod of a pneumatic cylinder, with heads of ⌀ 10 × 5 mm behind necks of ⌀ 6 mm: no ball in a head is larger than a neck, a disc is. It needs no more overlap than a
+/// head is larger than its neck.
+#[test]
+fn a_rod_with_flat_heads_stays_in_its_cylinder() {
+    let Some(folder) = support::shared("a_rod_with_flat_heads_stays_in_its_cylinder") else {
+        return;
+    };
+    let file = folder.join("real/o2ac_fixture_diagonal.step");
+    if !file.is_file() {
+        println!("skipped: no real/o2ac_fixture_diagonal.step among the shared parts");
+        return;
+    }
+    let assembly = support::load(&folder, "real/o2ac_fixture_diagonal.step");
+    let find = |name: &str| {
+        let all = 0..assembly.count();
+        all.into_iter()
+            .find(|&part| assembly.name(part).contains(name))
+            .expect("a part of the cylinder")
+    };
+    let (rod, body) = (find("ROD_11"), find("BODY_2"));
+    for (moving, fixed) in [(rod, body), (body, rod)] {
+        let budget = Budget::lasting(Duration::from_secs(240));
+        let Removal::Blocked(blocked) = remove(&assembly, &[moving], &[fixed], &[], &budget) else {
+            panic!("{} is not proved", assembly.name(moving));
+        };
+        assert!(
+            matches!(blocked.proof, Some(mortise_task::Proof::Ends { .. })),
+            "{blocked:?}"
+        );
+        let found = blocked.overlap_mm.expect("an overlap");
+        assert!((1.0..=2.0).contains(&found), "{found}");
+    }
+}
+
 #[test]
 fn without_time_nothing_is_claimed() {
     let assembly = support::own("mating/tests/data/two_pin_exact.step");

@@ -2,8 +2,8 @@
 //!
 //! Seats, in this order: the part's own place against b in the file; places there of equal parts, nearest first; such a place carried over to an equal
 //! bore of b; then ports of a and b that match in diameter ([`crate::matching`]); then flats on each other with bores in line ([`crate::flange`]);
-//! where no shaft, bore or bores in line fit and the part is not to go inside, then flat on flat ([`crate::plane_port`]). A filled seat overlaps the part in it and is passed over. The way
-//! in is the way out backwards, straight, from the side asked for.
+//! where no shaft, bore or bores in line fit and the part is not to go inside, then flat on flat ([`crate::plane_port`]).
+//! A filled seat overlaps the part in it and is passed over. The way in is the way out backwards, straight, from the side asked for.
 
 use glam::{DAffine3, DVec3};
 
@@ -16,14 +16,13 @@ use crate::matching::Matches;
 use crate::phrase::Amount;
 use crate::plane_seats::plane_seats;
 use crate::port::Port;
-use crate::reference::direction;
 use crate::turn::{Act, Code, Trouble, Verb};
 use crate::world::World;
 
-/// Cosine between the side asked for and the way out: within 45°.
-const AGREES: f64 = 0.7;
 /// Cosine between directions that are the same.
 const PARALLEL: f64 = 1.0 - 1e-12;
+/// Most places of a flange tried at which its flats meet.
+const MOST_FLANGES: usize = 16;
 /// Distance within which two bores are equal, mm.
 const EQUAL_MM: f64 = 1e-3;
 
@@ -96,13 +95,16 @@ fn put(world: &mut World, part: usize, into: usize, manner: &Manner) -> Result<A
         }
     }
     if found.is_none() && manner.hole.is_none() {
+        let mut met = 0;
         for pose in flanges(world, part, into) {
             world.set_placement(part, pose);
-            if world.assembly().are_within(part, into, ON_MM) {
-                tried = true;
-                found = enter(world, [part, into], &pose, manner, None, &mut blockers);
+            if !world.assembly().are_within(part, into, ON_MM) {
+                continue;
             }
-            if found.is_some() {
+            tried = true;
+            met += 1;
+            found = enter(world, [part, into], &pose, manner, None, &mut blockers);
+            if found.is_some() || met == MOST_FLANGES {
                 break;
             }
         }
@@ -242,11 +244,7 @@ fn enter(
     let mut ways: Vec<(f64, DVec3)> = world
         .ways(part)
         .into_iter()
-        .filter(|way| {
-            manner
-                .from
-                .is_none_or(|place| direction(place).dot(*way) > AGREES)
-        })
+        .filter(|way| manner.agrees(*way))
         .map(|way| (world.exit_mm(&[part], &fixed, way), way))
         .collect();
     ways.sort_by(|(s, v), (t, w)| {

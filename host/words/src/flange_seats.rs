@@ -12,8 +12,6 @@ use crate::world::World;
 
 /// Least distance of two bores that fix the angle, mm.
 const LEVER_MM: f64 = 1.0;
-/// Most places returned.
-const MOST: usize = 32;
 
 /// A way to bring bores in line: the motion from where the part is now, without its height along the normal.
 struct Pattern {
@@ -68,7 +66,6 @@ pub fn flanges(world: &World, part: usize, into: usize) -> Vec<DAffine3> {
         let each = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
         each.fold(Ordering::Equal, Ordering::then)
     });
-    places.truncate(MOST);
     places.into_iter().map(|(_, pose)| pose).collect()
 }
 

@@ -10,7 +10,6 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 use crate::lexicon::Relation;
 use crate::manner::Manner;
 use crate::port::Port;
-use crate::reference::direction;
 use crate::world::World;
 
 /// Gap by which a looser match may exceed the tightest one, mm on the radius.
@@ -19,8 +18,6 @@ const TIGHTEST_MM: f64 = 0.02;
 const LEVER_MM: f64 = 1.0;
 /// Most insertions tried.
 const MOST_TRIED: usize = 24;
-/// Cosine between the side asked for and the direction in which the part comes back out: within 45°.
-const AGREES: f64 = 0.7;
 /// Share of the shorter port that must be in the other.
 const ENGAGED: f64 = 0.5;
 
@@ -71,17 +68,8 @@ impl Matches {
         for (number, m) in found.into_iter().take(MOST_TRIED).enumerate() {
             let side = (here - m.other.middle()).dot(m.other.direction);
             let near = m.other.direction * if side < 0.0 { -1.0 } else { 1.0 };
-            let allowed = |entry: &DVec3| {
-                manner
-                    .from
-                    .is_none_or(|place| direction(place).dot(*entry) >= AGREES)
-            };
-            left.extend(
-                [near, -near]
-                    .into_iter()
-                    .filter(allowed)
-                    .map(|entry| (number, m, entry)),
-            );
+            let entries = [near, -near].into_iter().filter(|entry| manner.agrees(*entry));
+            left.extend(entries.map(|entry| (number, m, entry)));
         }
         Self {
             now: world.placement(part),

@@ -82,15 +82,21 @@ impl World {
             .map(|p| of_shapes[p.shape].clone())
             .collect();
         let flats = (0..count).map(|p| flats(assembly.surfaces(p)).into()).collect();
-        let of_shapes: Vec<Arc<[PlaneRegion]>> = (0..count)
-            .map(|p| regions(assembly.body(p).surface().shape(), assembly.surfaces(p)).into())
+        // Once for each shape.
+        let mut of_shape: HashMap<usize, Arc<[PlaneRegion]>> = HashMap::new();
+        let regions = (0..count)
+            .map(|p| {
+                let shape = assembly.model.parts[p].shape;
+                let prepare = || regions(&assembly.model.shapes[shape], assembly.surfaces(p)).into();
+                of_shape.entry(shape).or_insert_with(prepare).clone()
+            })
             .collect();
         let mut world = Self {
             assembly,
             home,
             ports,
             flats,
-            regions: of_shapes,
+            regions,
             kinds,
             joined: vec![vec![false; count]; count],
             diagonal: low.distance(high),
@@ -342,14 +348,16 @@ impl World {
     /// Travel of `moving` along the unit vector `direction`, at most `limit` mm, until it meets another part; and the pair that meets. Found to a
     /// micrometre.
     pub fn travel(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
-        let near = self.on_the_way(moving, direction, limit);
         let group = Moved {
             parts: &self.all_moving(moving),
             by: DAffine3::IDENTITY,
         };
-        let (share, pair) =
-            self.assembly
-                .touch_share_by_cores(&group, &near, &Motion::slide(direction * limit), STEP_MM);
+        let (share, pair) = self.assembly.touch_share_by_cores(
+            &group,
+            &self.others(moving),
+            &Motion::slide(direction * limit),
+            STEP_MM,
+        );
         (share * limit, pair)
     }
 
@@ -364,14 +372,13 @@ impl World {
             by: DAffine3::from_translation(direction * start),
             ..group
         };
-        let near = self.on_the_way(moving, direction, start);
-        if let Some((_, pair)) = self.assembly.excess(&started, &near, 0.0) {
+        let others = self.others(moving);
+        if let Some((_, pair)) = self.assembly.excess(&started, &others, 0.0) {
             return (0.0, Some(pair));
         }
-        let near = self.on_the_way(moving, direction, limit);
         let step = COARSE_MM.min(limit / 2.0);
         let motion = Motion::slide(direction * limit);
-        let (share, pair) = (self.assembly).free_share_by_cores(&group, &near, &motion, step);
+        let (share, pair) = (self.assembly).free_share_by_cores(&group, &others, &motion, step);
         (share * limit, pair)
     }
 
@@ -385,20 +392,6 @@ impl World {
             .filter(|(_, end)| *end > from)
             .map(|(start, _)| start.max(from))
             .fold(limit, f64::min)
-    }
-
-    /// Parts whose boxes meet the box of the motion.
-    fn on_the_way(&self, moving: &[usize], direction: DVec3, limit: f64) -> Vec<usize> {
-        let all = self.all_moving(moving);
-        let (mut low, mut high) = self.assembly.bounds_of(&all, DAffine3::IDENTITY);
-        low = low.min(low + direction * limit);
-        high = high.max(high + direction * limit);
-        let mut near = self.others(moving);
-        near.retain(|&o| {
-            let (l, h) = self.bounds(o);
-            low.cmple(h).all() && l.cmple(high).all()
-        });
-        near
     }
 
     /// Share of a motion that `part` makes before it meets another part, and the pair.

@@ -3,19 +3,10 @@
 mod support;
 
 use glam::{DAffine3, DQuat, DVec3};
-use mortise_brep::{CadModel, load_step};
+use mortise_brep::CadModel;
 use mortise_words::{Outcome, Session};
 
 const COVERS: [&str; 2] = ["back-cover", "front-cover"];
-
-fn motor(name: &str) -> Option<CadModel> {
-    let file = support::shared().map(|cad| cad.join("05_motor").join(name));
-    let Some(file) = file.filter(|file| file.is_file()) else {
-        println!("skipped: no {name} among the shared parts (set MORTISE_SHARED)");
-        return None;
-    };
-    Some(load_step(file).expect("the motor is read"))
-}
 
 fn number(model: &CadModel, name: &str) -> usize {
     model
@@ -41,7 +32,10 @@ fn places(parts: &[mortise_brep::Part]) -> Vec<DAffine3> {
 
 #[test]
 fn covers_come_to_their_designed_places() {
-    let (Some(exploded), Some(designed)) = (motor("motor_exploded.step"), motor("motor_flat.step")) else {
+    let (Some(exploded), Some(designed)) = (
+        support::motor("motor_exploded.step"),
+        support::motor("motor_flat.step"),
+    ) else {
         return;
     };
     let mut session = Session::new(exploded).expect("an assembly");
@@ -66,7 +60,7 @@ fn covers_come_to_their_designed_places() {
 
 #[test]
 fn from_any_place_flats_meet_and_bores_are_in_line() {
-    let Some(model) = motor("motor_exploded.step") else {
+    let Some(model) = support::motor("motor_exploded.step") else {
         return;
     };
     let mut random = fastrand::Rng::with_seed(11);
@@ -88,7 +82,7 @@ fn from_any_place_flats_meet_and_bores_are_in_line() {
 /// A cover brings along the bearing and the seal that are in it.
 #[test]
 fn what_is_in_a_cover_comes_along() {
-    let Some(exploded) = motor("motor_exploded.step") else {
+    let Some(exploded) = support::motor("motor_exploded.step") else {
         return;
     };
     let mut session = Session::new(exploded).expect("an assembly");

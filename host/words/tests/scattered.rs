@@ -3,17 +3,8 @@
 mod support;
 
 use glam::{DAffine3, DQuat, DVec3};
-use mortise_brep::{CadModel, Part, load_step};
+use mortise_brep::Part;
 use mortise_words::{Code, Outcome, Session};
-
-fn motor(name: &str) -> Option<CadModel> {
-    let file = support::shared().map(|cad| cad.join("05_motor").join(name));
-    let Some(file) = file.filter(|file| file.is_file()) else {
-        println!("skipped: no {name} among the shared parts (set MORTISE_SHARED)");
-        return None;
-    };
-    Some(load_step(file).expect("the motor is read"))
-}
 
 fn part<'a>(parts: &'a [Part], name: &str) -> &'a Part {
     let found = parts.iter().find(|part| part.name == name);
@@ -40,7 +31,10 @@ fn off(a: DAffine3, b: DAffine3) -> f64 {
 /// half a turn or upside down.
 #[test]
 fn a_magnet_comes_to_the_middle_of_a_side() {
-    let (Some(exploded), Some(designed)) = (motor("motor_exploded.step"), motor("motor_flat.step")) else {
+    let (Some(exploded), Some(designed)) = (
+        support::motor("motor_exploded.step"),
+        support::motor("motor_flat.step"),
+    ) else {
         return;
     };
     let mut random = fastrand::Rng::with_seed(5);
@@ -81,7 +75,7 @@ fn a_magnet_comes_to_the_middle_of_a_side() {
 /// Flats alone state no place on a much larger flat, none of a part that is to go inside, and none beside shafts and bores that fit.
 #[test]
 fn flats_do_not_stand_in_for_other_places() {
-    let Some(exploded) = motor("motor_exploded.step") else {
+    let Some(exploded) = support::motor("motor_exploded.step") else {
         return;
     };
     let mut session = Session::new(exploded).unwrap();
@@ -106,7 +100,10 @@ fn flats_do_not_stand_in_for_other_places() {
 /// By words, with amounts where no surface states how far, every part comes to its designed place within a micrometre.
 #[test]
 fn all_parts_come_to_their_designed_places() {
-    let (Some(exploded), Some(designed)) = (motor("motor_exploded.step"), motor("motor_flat.step")) else {
+    let (Some(exploded), Some(designed)) = (
+        support::motor("motor_exploded.step"),
+        support::motor("motor_flat.step"),
+    ) else {
         return;
     };
     let mut session = Session::new(exploded).unwrap();

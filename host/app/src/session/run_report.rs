@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use mortise_page::escaped;
+
 use super::history::{Quantity, SIGNALS, Signal, distribution, envelope};
 use super::run::Run;
 
@@ -214,21 +216,6 @@ fn chart(
 fn label(value: f64, span: f64) -> String {
     let digits = (2.0 - span.max(1e-9).log10()).clamp(0.0, 4.0) as usize;
     format!("{value:.digits$}")
-}
-
-/// Text that HTML takes as it is.
-fn escaped(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '&' => safe.push_str("&amp;"),
-            '"' => safe.push_str("&quot;"),
-            c => safe.push(c),
-        }
-    }
-    safe
 }
 
 #[cfg(test)]

@@ -52,8 +52,8 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// The steps of a sequence that was found for `assembly`. Cost: a comparison of two boxes for each pair of parts.
-    pub fn new(assembly: &Assembly, found: &Found) -> Self {
+    /// The steps of a sequence that was found for `assembly`, with their report. Cost: a picture a step, and a comparison of two boxes for each pair of parts.
+    pub fn new(title: &str, assembly: &Assembly, found: &Found) -> Self {
         let report = report::sequence(assembly, found, Sense::Assembly);
         let all: Vec<usize> = (0..assembly.count()).collect();
         let (low, high) = assembly.bounds_of(&all, DAffine3::IDENTITY);
@@ -98,7 +98,7 @@ impl Sequence {
             steps,
             verdict,
             stuck: report.stuck.iter().map(|stuck| stuck.words()).collect(),
-            page: Arc::default(),
+            page: mortise_page::page(title, assembly, found).into(),
             file: all.iter().map(|part| assembly.placement(*part)).collect(),
             radius,
         }
@@ -228,7 +228,7 @@ mod tests {
         let assembly = Assembly::new(model).expect("an assembly");
         let all: Vec<usize> = (0..assembly.count()).collect();
         let found = mortise_task::sequence::disassemble(&assembly, &all, Duration::from_secs(60));
-        let sequence = Sequence::new(&assembly, &found);
+        let sequence = Sequence::new("sample", &assembly, &found);
         (assembly, sequence)
     }
 

@@ -71,7 +71,5 @@ fn search(title: &str, model: &CadModel) -> Result<Sequence, String> {
     let assembly = Assembly::new(model.clone()).map_err(|error| error.to_string())?;
     let all: Vec<usize> = (0..assembly.count()).collect();
     let found = sequence::disassemble(&assembly, &all, LONGEST);
-    let mut sequence = Sequence::new(&assembly, &found);
-    sequence.page = mortise_page::page(title, &assembly, &found).into();
-    Ok(sequence)
+    Ok(Sequence::new(title, &assembly, &found))
 }
