@@ -7,7 +7,7 @@ use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
-use mortise_haptics::State as LawState;
+use mortise_haptics::{Pose, State as LawState};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{
@@ -118,6 +118,13 @@ pub enum CommandKind<'s> {
         joint: u8,
         /// Force at the handle at the push's peak, N.
         force: f32,
+    },
+    /// Put a part at a pose.
+    Place {
+        /// Index in the scene.
+        part: u16,
+        /// Its new pose.
+        pose: Pose,
     },
 }
 

@@ -27,6 +27,7 @@ use crate::parameters::Parameters;
 use crate::scripts::{check_input_faults, check_script};
 use crate::store::Store;
 use crate::store::rig::Kept;
+use crate::wire::pose_from_wire;
 
 use answers::{Answer, Answers};
 use freshness::Freshness;
@@ -394,6 +395,10 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::Restart => CommandKind::Restart,
             ToDevice::RecordInputs(on) => CommandKind::RecordInputs(on),
             ToDevice::GetReadings => CommandKind::Readings,
+            ToDevice::Place { part, pose } => CommandKind::Place {
+                part,
+                pose: pose_from_wire(&pose).ok_or(Refusal::BadNumber)?,
+            },
         };
         self.enqueue(seq, kind)?;
         Ok(None)

@@ -556,7 +556,7 @@ proptest! {
 
     /// Any order of valid messages satisfies the rule: motors driven only in a live state.
     #[test]
-    fn any_order_of_messages_keeps_motors_and_state_together(choices in prop::collection::vec((0u8..17, 0u32..150), 1..40)) {
+    fn any_order_of_messages_keeps_motors_and_state_together(choices in prop::collection::vec((0u8..18, 0u32..150), 1..40)) {
         let mut bench = Bench::ready();
         for (choice, wait) in choices {
             let message = match choice {
@@ -574,6 +574,7 @@ proptest! {
                 13 => ToDevice::SetTelemetry { every_ticks: 3 },
                 14 => ToDevice::Restart,
                 15 => ToDevice::TestMotor { joint: 1, force: -0.5 },
+                16 => ToDevice::Place { part: 1, pose: WirePose { position: [0.0, 0.0, 0.05], orientation: [0.0, 0.0, 0.0, 1.0] } },
                 _ => ToDevice::Heartbeat,
             };
             bench.send(&message);

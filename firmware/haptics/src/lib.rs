@@ -60,5 +60,5 @@ pub use settings::{
     LimitSettings, ObjectSettings, PassivitySettings, Settings,
 };
 pub use settings_group::{FromParameter, Range, SettingsError, each_parameter_drives_one_setting};
-pub use state::{GrabError, State};
+pub use state::{GrabError, PlaceError, State};
 pub use tick::tick;

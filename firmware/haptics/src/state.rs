@@ -77,6 +77,20 @@ impl fmt::Display for GrabError {
 
 impl core::error::Error for GrabError {}
 
+/// Why a part could not be placed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlaceError {
+    /// The scene has no part of this index.
+    NoSuchPart {
+        /// Number of parts in the scene.
+        parts: u16,
+    },
+    /// It is in hand.
+    Held,
+    /// The pose is not finite, farther than 100 m from the origin along an axis, or no rotation.
+    BadPose,
+}
+
 impl Default for State {
     fn default() -> Self {
         Self::new()
@@ -122,6 +136,23 @@ impl State {
                 local_center,
             });
         }
+    }
+
+    /// Puts part `part`, which nobody holds, at a pose. A part placed into others is pushed out once it is grabbed, like any that overlaps.
+    ///
+    /// # Errors
+    /// [`PlaceError`]; nothing changed.
+    pub fn place(&mut self, part: u16, pose: &Pose) -> Result<(), PlaceError> {
+        if self.grabbed() == Some(part) {
+            return Err(PlaceError::Held);
+        }
+        let parts = self.parts.len() as u16;
+        let placed = (self.parts.get_mut(usize::from(part))).ok_or(PlaceError::NoSuchPart { parts })?;
+        let pose = usable_pose(pose).ok_or(PlaceError::BadPose)?;
+        placed.pose = pose;
+        placed.center = pose.transform_point(placed.local_center);
+        self.hand.invalidate();
+        Ok(())
     }
 
     /// Grabs part `part` at its placement: the offset between handle and part is kept, so no force arises.

@@ -113,6 +113,13 @@ impl<'a> Guide<'a> {
         self.fits = fits;
     }
 
+    /// Records that a part which nobody holds was put at a pose, mm.
+    pub fn place(&mut self, part: usize, pose: DAffine3) {
+        if let Some(place) = self.poses.get_mut(part) {
+            *place = pose;
+        }
+    }
+
     /// Resets every part to its pose in the model.
     pub fn put_back(&mut self) {
         self.poses = placements(self.model);

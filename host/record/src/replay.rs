@@ -361,6 +361,7 @@ impl<'r> Player<'r> {
             | ToDevice::Grab { .. }
             | ToDevice::Release
             | ToDevice::ResetScene
+            | ToDevice::Place { .. }
             | ToDevice::SetTarget(_)
             | ToDevice::ClearTarget { .. } => self.client.request(message.clone()),
             _ => return Ok(()),

@@ -6,7 +6,7 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use libtest_mimic::{Arguments, Failed, Trial};
-use mortise_protocol::message::ToDevice;
+use mortise_protocol::message::{ToDevice, WirePose};
 use mortise_protocol::parameter::ParameterId;
 use mortise_record::{EntryKind, RecordError, Recorder, Recording, Replayed, Written, replay};
 use mortise_rig::{Client, RigSpec};
@@ -157,6 +157,15 @@ fn real_time() -> Result<(), Failed> {
         client.request(ToDevice::Disarm)?;
         pause(150);
         client.request(ToDevice::ResetScene)?;
+        // The next round begins with the part elsewhere.
+        let [x, y, z] = (1e-3 * scene.placement().translation).as_vec3().to_array();
+        client.request(ToDevice::Place {
+            part: scene.part,
+            pose: WirePose {
+                position: [x, y, z + 1e-3 * random.f32()],
+                orientation: [0.0, 0.0, 0.0, 1.0],
+            },
+        })?;
     }
     let written = recorder.finish(Some(&client))?;
     let replayed = replay(&Recording::open(&path)?, &[])?;

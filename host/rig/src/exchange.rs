@@ -78,7 +78,8 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::RecordInputs(_)
         | ToDevice::GetReadings
         | ToDevice::GetStatistics { reset: false }
-        | ToDevice::Lockstep(_) => true,
+        | ToDevice::Lockstep(_)
+        | ToDevice::Place { .. } => true,
         ToDevice::Arm
         | ToDevice::ClearFault
         // The handle may have left its reference pose between the two.

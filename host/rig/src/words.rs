@@ -198,6 +198,7 @@ impl Words for ToDevice {
             Self::RecordInputs(true) => "recording the inputs of every tick".into(),
             Self::RecordInputs(false) => "ending the recording of inputs".into(),
             Self::GetReadings => "reading encoders and inputs".into(),
+            Self::Place { part, .. } => format!("placing part {part}"),
             Self::TestMotor { joint, .. } => format!("testing the motor of joint {}", joint + 1),
         }
     }

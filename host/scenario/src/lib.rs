@@ -6,6 +6,7 @@
 
 mod error;
 mod hand;
+pub mod insertions;
 pub mod measure;
 mod outcome;
 pub mod overlap;

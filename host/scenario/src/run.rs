@@ -19,7 +19,7 @@ use crate::{measure, overlap, truth, wire};
 /// Ticks requested at once: bounds the telemetry that waits, and the delay until a fault is seen.
 const BATCH_TICKS: u32 = 500;
 /// Ticks after disarming in which the wrench fades out.
-const FADE_TICKS: u32 = 150;
+pub(crate) const FADE_TICKS: u32 = 150;
 
 /// Reads, bakes and plays `scenario` on the rig `spec`, in lockstep, and measures.
 ///
@@ -106,12 +106,8 @@ pub fn record(
     }
     let expected = (scenario.faults.as_ref()).is_some_and(|faults| !faults.inputs.is_empty());
     let mut play = Play {
-        client,
-        samples: Vec::new(),
-        messages: 0,
-        begun: 0,
         expected,
-        fault: None,
+        ..Play::new(client)
     };
     play.prepare(scenario, scene)?;
     let line = line_of(client, scenario)?;
@@ -160,9 +156,11 @@ fn line_of<'c>(client: &'c Client, scenario: &Scenario) -> Result<Option<&'c Fau
     }
 }
 
-struct Play<'c> {
-    client: &'c Client,
-    samples: Vec<Telemetry>,
+/// A rig while it plays.
+pub(crate) struct Play<'c> {
+    pub client: &'c Client,
+    /// Samples heard so far.
+    pub samples: Vec<Telemetry>,
     messages: u32,
     /// Tick in which the hand began.
     begun: u32,
@@ -172,7 +170,18 @@ struct Play<'c> {
     fault: Option<(u32, Fault)>,
 }
 
-impl Play<'_> {
+impl<'c> Play<'c> {
+    pub fn new(client: &'c Client) -> Self {
+        Self {
+            client,
+            samples: Vec::new(),
+            messages: 0,
+            begun: 0,
+            expected: false,
+            fault: None,
+        }
+    }
+
     /// Takes the board's samples, including lost ones, and its fault reports.
     fn overheard(&mut self, line: &FaultLine) -> Result<(), ScenarioError> {
         self.samples.clear();
@@ -294,7 +303,7 @@ impl Play<'_> {
     }
 
     /// Runs `every` ticks at a time and sends the listener's answers to their samples.
-    fn heeding(
+    pub fn heeding(
         &mut self,
         listener: &mut Listener<'_>,
         ticks: u32,
@@ -327,7 +336,7 @@ impl Play<'_> {
     }
 
     /// Runs ticks in batches and takes the board's messages meanwhile.
-    fn run(&mut self, ticks: u32) -> Result<Ran, ScenarioError> {
+    pub fn run(&mut self, ticks: u32) -> Result<Ran, ScenarioError> {
         let mut left = ticks;
         loop {
             let batch = left.min(BATCH_TICKS);
@@ -340,7 +349,7 @@ impl Play<'_> {
         }
     }
 
-    fn listen(&mut self) -> Result<(), ScenarioError> {
+    pub fn listen(&mut self) -> Result<(), ScenarioError> {
         let client = self.client;
         for event in client.events().try_iter() {
             match event {

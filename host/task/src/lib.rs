@@ -6,7 +6,8 @@
 //!    motion ([`least_over`]).
 //! 3. [`mod@graph`]: the connection graph; [`ports`]: places for connections.
 //! 4. [`mobility`]: freedoms by contact cones ([`mod@cone`]), confirmed over finite steps.
-//! 5. [`removal`]: ways out of one or several legs, and proofs that there is none ([`Proof`]); [`blocking`] and [`sequence`]: whole sequences with subassemblies.
+//! 5. [`removal`]: ways out of one or several legs, and proofs that there is none ([`Proof`]); [`blocking`] and [`sequence`]: whole sequences with subassemblies;
+//!    [`insertion`]: their steps that a hand can do.
 //! 6. [`report`]: results as values for JSON.
 //!
 //! Lengths are mm, angles radians, poses from part to assembly. Nothing here reads files, and results depend on no random numbers but those of fixed seeds; where
@@ -23,6 +24,7 @@ mod explore;
 pub mod graph;
 mod helix;
 mod hints;
+pub mod insertion;
 mod kept;
 mod leg;
 mod linking;

@@ -23,6 +23,14 @@ pub struct Waypoint {
     pub q: [f64; 4],
 }
 
+impl Waypoint {
+    /// As a transform.
+    pub fn pose(&self) -> DAffine3 {
+        let [w, x, y, z] = self.q;
+        DAffine3::from_rotation_translation(DQuat::from_xyzw(x, y, z, w), DVec3::from_array(self.t))
+    }
+}
+
 /// Waypoints of a path from its start at `from`.
 pub fn waypoints(path: &Path, from: DAffine3) -> Vec<Waypoint> {
     let mut by = from;

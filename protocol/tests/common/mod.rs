@@ -449,7 +449,7 @@ impl Random {
 }
 
 /// Kinds of host message; a test compares it with the schema.
-pub const TO_DEVICE: usize = 31;
+pub const TO_DEVICE: usize = 32;
 
 /// A random host message of kind `kind < TO_DEVICE`.
 pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
@@ -494,9 +494,13 @@ pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
         27 => ToDevice::GetRig,
         28 => ToDevice::RecordInputs(r.bool()),
         29 => ToDevice::GetReadings,
-        _ => ToDevice::TestMotor {
+        30 => ToDevice::TestMotor {
             joint: r.u8(),
             force: r.f32(),
+        },
+        _ => ToDevice::Place {
+            part: r.u16(),
+            pose: r.pose(),
         },
     }
 }

@@ -1,6 +1,6 @@
 //! What each command does.
 
-use mortise_haptics::{GrabError, TargetError, Twist, Wrench};
+use mortise_haptics::{GrabError, PlaceError, Pose, TargetError, Twist, Wrench};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{ConstraintTarget, Fault, Refusal};
 
@@ -32,6 +32,7 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
             CommandKind::Grab(part) => self.grab(part),
             CommandKind::Release => self.request(SafetyEvent::Release),
             CommandKind::ResetScene => self.reset_scene(),
+            CommandKind::Place { part, pose } => self.place(part, &pose),
             CommandKind::SetTarget(target) => self.set_target(&target),
             CommandKind::ClearTarget(id) => {
                 self.ends.law.clear_target(id);
@@ -158,6 +159,21 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
         }
         self.start_anew();
         Ok(())
+    }
+
+    /// Only with the motors off: a part put into the held one would push it at once.
+    fn place(&mut self, part: u16, pose: &Pose) -> Result<(), Refusal> {
+        if self.safety.live() {
+            return Err(Refusal::State(self.safety.reported()));
+        }
+        if self.scene.is_none() {
+            return Err(Refusal::NoScene);
+        }
+        self.ends.law.place(part, pose).map_err(|error| match error {
+            PlaceError::NoSuchPart { parts } => Refusal::NoSuchPart { parts },
+            PlaceError::Held => Refusal::State(self.safety.reported()),
+            PlaceError::BadPose => Refusal::BadNumber,
+        })
     }
 
     fn use_scene(&mut self, scene: SceneImage<'s>, number: u32) -> Result<(), Refusal> {

@@ -106,11 +106,13 @@ impl Coherence {
         }
     }
 
-    /// Voids all entries. For a jump of the object, or other parts.
+    /// Voids all entries. For a jump of the object, or other parts. The nodes' turns begin anew: where a tick's budget ends the search, what it found
+    /// depends on them, and a run after a reset must not depend on what went before.
     pub fn invalidate(&mut self) {
         // Equivalent to travelling past every bound: clearing the table costs more than most ticks.
         self.add_travel(FARTHEST_NM);
         self.invalidated_nm = self.travel_nm;
+        self.round = 0;
     }
 
     fn add_travel(&mut self, nm: u32) {

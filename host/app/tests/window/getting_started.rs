@@ -187,7 +187,7 @@ enum Run {
 
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 
-const COMMANDS: [(&str, Run); 33] = [
+const COMMANDS: [(&str, Run); 34] = [
     ("cargo xtask setup", Run::Elsewhere("CI, before anything else")),
     ("cargo xtask demo", Run::Elsewhere("the step `window` plays it")),
     (
@@ -259,6 +259,13 @@ const COMMANDS: [(&str, Run); 33] = [
         Run::Here(
             &["assemble", SAMPLE, "--report", "REPORT", "--json"],
             "\"assembles\"",
+        ),
+    ),
+    (
+        "mortise assemble FILE --play emulated",
+        Run::Here(
+            &["assemble", SAMPLE, "--play", "sim", "--json"],
+            "\"in_place\":true",
         ),
     ),
     (

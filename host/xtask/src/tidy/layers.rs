@@ -114,10 +114,12 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-firmware",
             "mortise-guide",
             "mortise-haptics",
+            "mortise-mating",
             "mortise-mechanism",
             "mortise-protocol",
             "mortise-rig",
             "mortise-simulation",
+            "mortise-task",
         ],
     ),
     // Experiments are a program of their own.

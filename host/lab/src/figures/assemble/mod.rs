@@ -5,6 +5,7 @@ mod assembly_file;
 mod checked;
 mod extraction;
 mod large;
+mod played;
 mod sequences;
 mod words;
 
@@ -17,12 +18,14 @@ const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to thei
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     sequences::own(out)?;
     large::measure(plan, out)?;
+    played::own(out)?;
     let Some(cad) = corpus::folder() else {
         for what in [
             "tasks of extraction",
             "pairs that stay together",
             "sequences of whole assemblies",
             "the motor of 18 parts by words",
+            "assemblies played by a simulated hand",
         ] {
             out(Row::skipped(what, ABSENT));
         }
@@ -30,5 +33,6 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     };
     extraction::measure(&cad, plan, out)?;
     sequences::measure(&cad, plan, out)?;
-    words::measure(&cad, out)
+    words::measure(&cad, out)?;
+    played::measure(&cad, out)
 }
