@@ -89,10 +89,8 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
         }
         Step::Arm => {
             if session.device() == Some(DeviceState::Idle) {
-                if !tour.asked
-                    && let Some(connection) = session.connection()
-                {
-                    connection.request(ToDevice::ResetScene);
+                if !tour.asked {
+                    session.put_back();
                 }
                 ask(session, ToDevice::Arm);
                 return None;

@@ -176,15 +176,21 @@ impl Document {
         !placements.eq(&self.placed)
     }
 
+    /// Where the parts of the baked scene are placed, in its order, mm; `None` until it is baked.
+    pub fn scene_placements(&self) -> Option<Vec<DAffine3>> {
+        let parts = self.baked.as_ref()?.report.parts.iter();
+        parts
+            .map(|part| self.placed.get(part.model_part).copied())
+            .collect()
+    }
+
     /// The scene to send to a board, once baked: with the parts where they are placed.
     pub fn scene(&self) -> Option<Arc<Baked>> {
         let baked = self.baked.as_ref()?;
         if !self.is_placed() {
             return Some(Arc::clone(baked));
         }
-        let parts = baked.report.parts.iter();
-        let poses = parts.map(|part| self.placed.get(part.model_part).copied());
-        let image = with_placements(&baked.image, &poses.collect::<Option<Vec<_>>>()?)?;
+        let image = with_placements(&baked.image, &self.scene_placements()?)?;
         let report = baked.report.clone();
         Some(Arc::new(Baked { image, report }))
     }

@@ -12,6 +12,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use glam::DAffine3;
 use mortise_bake::Baked;
 use mortise_guide::GuideSettings;
 use mortise_mating::recognise::{Target, TargetId};
@@ -23,6 +24,7 @@ use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 
 use super::document::Document;
 use super::fits::FitChoice;
+use super::flashed::Flashed;
 use super::forwarding::pass_on;
 use super::guidance;
 use super::introduction::{introduce, send_rig};
@@ -51,6 +53,13 @@ pub enum Command {
         generation: u64,
         /// Cancels the upload.
         cancel: Cancel,
+    },
+    /// Put parts elsewhere in the scene that is on the board.
+    Place {
+        /// What to ask of the board, in this order.
+        messages: Vec<ToDevice>,
+        /// The scene's document.
+        generation: u64,
     },
     /// Query the counters.
     Statistics,
@@ -111,6 +120,10 @@ pub struct Connection {
     pub scene_of: Option<u64>,
     /// Document whose scene the board refused.
     pub refused_scene_of: Option<u64>,
+    /// The scene in the board's flash, once it was uploaded.
+    flashed: Option<Flashed>,
+    /// The scene that is being uploaded.
+    sending: Option<Flashed>,
     /// Progress of the upload under way.
     pub upload: Option<UploadProgress>,
     /// Start of the upload.
@@ -257,6 +270,16 @@ fn carry_out(
                 },
             }
         }
+        Command::Place { messages, generation } => {
+            let mut placed = messages.into_iter().map(|message| client.request(message));
+            match placed.find_map(Result::err) {
+                Some(error) if is_the_links(client, &error) => LinkUpdate::Unanswered,
+                error => LinkUpdate::Uploaded {
+                    generation,
+                    result: error.map_or(Ok(true), |error| Err(error.to_string())),
+                },
+            }
+        }
         Command::Statistics => match client.statistics(false) {
             Ok(statistics) => LinkUpdate::Statistics(statistics),
             Err(_) => LinkUpdate::Unanswered,
@@ -305,6 +328,8 @@ impl Connection {
             state: client.state(),
             scene_of: None,
             refused_scene_of: None,
+            flashed: None,
+            sending: None,
             upload: None,
             upload_since: Instant::now(),
             upload_cancel: Cancel::default(),
@@ -331,17 +356,58 @@ impl Connection {
         self.command(Command::Request(Box::new(message)));
     }
 
-    /// Starts the upload of a scene.
-    pub fn send_scene(&mut self, baked: Arc<Baked>, generation: u64) {
-        let total = baked.image.len();
-        self.upload = Some(UploadProgress { sent: 0, total });
+    /// Brings a scene onto the board with its parts at `placements`, in the image's order, mm: an image that is there already gets its parts placed, which
+    /// writes no flash; any other is uploaded.
+    pub fn send_scene(&mut self, baked: Arc<Baked>, placements: Vec<DAffine3>, generation: u64) {
+        if let Some(flashed) = self.flashed.as_ref().filter(|flashed| flashed.has(&baked)) {
+            let messages = flashed.moved_to(&placements);
+            // Nothing else is placed or uploaded meanwhile.
+            self.upload = Some(UploadProgress { sent: 0, total: 1 });
+            self.command(Command::Place { messages, generation });
+            return;
+        }
+        let sent = Flashed::new(baked, placements);
+        let Some(image) = sent.image() else {
+            return;
+        };
+        self.upload = Some(UploadProgress {
+            sent: 0,
+            total: image.image.len(),
+        });
         self.upload_since = Instant::now();
         self.upload_cancel = Cancel::default();
+        self.flashed = None;
+        self.sending = Some(sent);
         self.command(Command::Upload {
-            baked,
+            baked: image,
             generation,
             cancel: self.upload_cancel.clone(),
         });
+    }
+
+    /// Lets the scene be uploaded as a whole, where it would only get its parts placed.
+    pub fn forget_scene(&mut self) {
+        self.flashed = None;
+        self.scene_of = None;
+    }
+
+    /// Whether a reset of the scene on the board puts its parts, in the image's order, at `placements`.
+    pub fn resets_to(&self, placements: &[DAffine3]) -> bool {
+        (self.flashed.as_ref()).is_some_and(|flashed| flashed.resets_to(placements))
+    }
+
+    /// Records the end of an upload, or of a change of places; `true` after an upload.
+    pub fn sent_scene(&mut self, done: bool) -> bool {
+        self.upload = None;
+        let sent = self.sending.take();
+        let uploaded = sent.is_some();
+        match (sent, done) {
+            (Some(sent), true) => self.flashed = Some(sent),
+            (None, true) => {}
+            // Which scene is there, and where its parts are, is no longer known.
+            (_, false) => self.flashed = None,
+        }
+        uploaded
     }
 
     /// Cancels the upload under way; the scene in use stays.

@@ -13,6 +13,7 @@ mod find_joints;
 pub mod finding;
 pub mod fits;
 pub mod fitting;
+mod flashed;
 pub mod flashing;
 mod following;
 mod forwarding;

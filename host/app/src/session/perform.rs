@@ -266,11 +266,17 @@ impl Session {
 
     pub(super) fn upload(&mut self) {
         let Some(document) = &self.document else { return };
-        let (Some(scene), generation) = (document.scene(), document.generation) else {
+        let generation = document.generation;
+        let (Some(baked), Some(placements)) = (document.baked.clone(), document.scene_placements()) else {
             return;
         };
+        // A recording has no places but those of images.
+        let records = self.recording.is_some();
         if let Some(connection) = self.connection_mut() {
-            connection.send_scene(scene, generation);
+            if records {
+                connection.forget_scene();
+            }
+            connection.send_scene(baked, placements, generation);
         }
     }
 

@@ -3,6 +3,7 @@
 use glam::DAffine3;
 use mortise_protocol::message::ToDevice;
 
+use super::document::Document;
 use super::moves::PUT_BACK;
 use super::state::Session;
 
@@ -24,7 +25,7 @@ impl Session {
         }
     }
 
-    /// Puts every part of the document at a pose, mm. A board gets the scene anew, with its parts there; its motors must be off.
+    /// Puts every part of the document at a pose, mm, also in the scene that a board has; its motors must be off.
     pub(super) fn place(&mut self, poses: Vec<DAffine3>) {
         let Some(document) = &mut self.document else {
             return;
@@ -41,17 +42,36 @@ impl Session {
         }
     }
 
+    /// Before a recording begins: where parts were placed since the upload, the scene is uploaded anew within the recording, which otherwise would begin at
+    /// places that no image has.
+    pub(super) fn bring_whole_scene(&mut self) {
+        let placements = (self.document.as_ref()).and_then(Document::scene_placements);
+        if let (Some(placements), Some(connection)) = (placements, self.connection_mut())
+            && !connection.resets_to(&placements)
+        {
+            connection.forget_scene();
+        }
+    }
+
     /// Moves every part back to its position in the file.
     pub(super) fn put_back(&mut self) {
         let Some(document) = &mut self.document else {
             return;
         };
+        let placements = document.scene_placements();
         if document.is_placed() {
             let poses = document.file_poses();
             self.place(poses);
             self.note_step(PUT_BACK);
-        } else if let Some(connection) = self.connection() {
-            connection.request(ToDevice::ResetScene);
+        } else if let Some(connection) = self.connection_mut() {
+            if placements.is_some_and(|placements| connection.resets_to(&placements)) {
+                connection.request(ToDevice::ResetScene);
+            } else {
+                // Parts were elsewhere when the scene was uploaded.
+                connection.scene_of = None;
+                self.upload_if_due();
+                self.note_step(PUT_BACK);
+            }
         } else if let Some(document) = &mut self.document {
             document.reset_poses();
             self.note_step(PUT_BACK);

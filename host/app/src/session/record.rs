@@ -29,6 +29,7 @@ impl Session {
             Ok(folder) => folder,
             Err(why) => return self.notes.add(Severity::Error, why),
         };
+        self.bring_whole_scene();
         let on_board = self.scene_is_on_board();
         let scene = (self.document.as_ref().filter(|_| on_board)).and_then(Document::scene);
         if let Some(connection) = self.connection() {

@@ -406,7 +406,7 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>
     let Some(connection) = session.connection_mut() else {
         return;
     };
-    connection.upload = None;
+    let whole = connection.sent_scene(matches!(result, Ok(true)));
     match result {
         Ok(false) => {
             // Uploaded again only on the operator's request.
@@ -425,9 +425,11 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>
                     document.reset_poses();
                 }
                 session.start_guidance();
-                session
-                    .notes
-                    .add(Severity::Good, "The collision model is on the board");
+                if whole {
+                    session
+                        .notes
+                        .add(Severity::Good, "The collision model is on the board");
+                }
             }
         }
         Err(why) => {

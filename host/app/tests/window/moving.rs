@@ -401,6 +401,15 @@ fn a_board_gets_what_is_dragged_once_it_is_let_go_of_and_what_is_undone() {
     undo(&mut harness);
     assert_eq!(poses(&harness), there);
     assert_eq!(said(&harness), why);
+    // Without another upload: the parts alone were placed, and the board has them there.
+    let uploads: Vec<u32> = (harness.state().session.notes.iter())
+        .filter(|note| note.text == "The collision model is on the board")
+        .map(|note| note.times)
+        .collect();
+    assert_eq!(uploads, [1]);
+    harness.state_mut().session.act(Intent::Grab(1));
+    until(&mut harness, "held", |s| s.grabbed() == Some(1));
+    assert!(poses(&harness)[1].abs_diff_eq(there[1], 0.05));
     click(&mut harness, "STOP");
 }
 

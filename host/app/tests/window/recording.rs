@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::common::{click, connect, harness, open_sample, record_insertion, until};
+use crate::common::{click, connect, harness, open_sample, poses, record_insertion, until};
+use mortise::session::Session;
 use mortise::session::link::Link;
 use mortise_record::{Recording, replay};
 
@@ -51,4 +52,27 @@ fn a_session_is_recorded_and_replays_and_a_lost_link_ends_the_file() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     };
     assert!(second.entries().count() > 0);
+}
+
+/// Where parts were placed on the board since the upload, the recording begins with an upload, without which it could not be computed again.
+#[test]
+fn a_recording_of_moved_parts_replays() {
+    let data = tempfile::tempdir().expect("a folder");
+    let mut harness = harness();
+    harness.state_mut().session.recordings = Some(data.path().join("recordings"));
+    open_sample(&mut harness);
+    harness.run_steps(3);
+    click(&mut harness, "peg");
+    connect(&mut harness);
+    harness.run_steps(2);
+    let before = poses(&harness);
+    harness.key_press(egui::Key::PageUp);
+    harness.run_steps(2);
+    until(&mut harness, "the part is placed", Session::scene_is_on_board);
+    assert_ne!(poses(&harness), before);
+    let path = record_insertion(&mut harness);
+    let recording = Recording::open(&path).expect("a recording");
+    let replayed = replay(&recording, &[]).expect("it can be replayed");
+    assert_eq!(replayed.difference, None, "{replayed:?}");
+    assert!(replayed.compared > 1000, "{replayed:?}");
 }
