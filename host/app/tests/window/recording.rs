@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use crate::common::{click, connect, harness, open_sample, poses, record_insertion, until};
-use mortise::session::Session;
+use crate::common::{arm, click, connect, harness, open_sample, poses, record_insertion, until};
+use glam::{DAffine3, DVec3};
+use mortise::session::insertion::hold;
 use mortise::session::link::Link;
+use mortise::session::{Intent, Session};
 use mortise_record::{Recording, replay};
 
 /// Files of the folder for recordings.
@@ -70,7 +72,28 @@ fn a_recording_of_moved_parts_replays() {
     harness.run_steps(2);
     until(&mut harness, "the part is placed", Session::scene_is_on_board);
     assert_ne!(poses(&harness), before);
-    let path = record_insertion(&mut harness);
+    let there = poses(&harness)[1];
+    click(&mut harness, "Record");
+    until(&mut harness, "the recording", |s| {
+        s.recording.is_some() && s.scene_is_on_board()
+    });
+    let path = (harness.state().session.recording.as_ref())
+        .expect("just seen")
+        .path
+        .clone();
+    arm(&mut harness);
+    harness.state_mut().session.act(Intent::Grab(1));
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
+    assert!(poses(&harness)[1].abs_diff_eq(there, 0.05));
+    let handle = harness.state().session.handle().expect("a handle");
+    let down = DAffine3::from_translation(DVec3::new(3.0, 0.0, -40.0));
+    harness.state_mut().session.move_hand(hold(&(down * handle)));
+    let begun = std::time::Instant::now();
+    until(&mut harness, "a second has passed", move |_| {
+        begun.elapsed().as_secs_f64() > 1.0
+    });
+    harness.state_mut().session.act(Intent::EndRecording);
+    until(&mut harness, "the end", |s| s.recording.is_none());
     let recording = Recording::open(&path).expect("a recording");
     let replayed = replay(&recording, &[]).expect("it can be replayed");
     assert_eq!(replayed.difference, None, "{replayed:?}");
