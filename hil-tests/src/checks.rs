@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_CHUNK;
-use mortise_protocol::message::{CostUnit, DeviceState, Refusal, ToDevice, Version};
+use mortise_protocol::message::{CostUnit, DeviceState, Refusal, ToDevice, Version, WirePose};
 use mortise_protocol::parameter::PARAMETERS;
 use mortise_rig::{Client, Event, RigError, begin_message, chunk_message};
 
@@ -26,6 +26,7 @@ pub const CHECKS: &[Check] = &[
     ("garbage_does_no_harm", garbage_does_no_harm),
     ("another_version_is_shut_out", another_version_is_shut_out),
     ("stop_stops", stop_stops),
+    ("placing_is_refused_in_its_order", placing_is_refused_in_its_order),
     ("idle_ticks_are_on_time", idle_ticks_are_on_time),
     ("the_log_is_readable", the_log_is_readable),
     (
@@ -235,6 +236,31 @@ pub fn stop_stops(client: Client) -> Verdict {
     })?;
     fine(client.request(ToDevice::ClearFault))?;
     Ok("stopped until cleared".into())
+}
+
+/// A pose that is none is refused, then a part that is none; and any while the motors are on.
+pub fn placing_is_refused_in_its_order(client: Client) -> Verdict {
+    fine(client.upload(&image(500, 7), &mut |_| {}))?;
+    if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
+        fine(client.request(ToDevice::ClearFault))?;
+    }
+    let place = |w: f32| ToDevice::Place {
+        part: 0,
+        pose: WirePose {
+            position: [0.0; 3],
+            orientation: [0.0, 0.0, 0.0, w],
+        },
+    };
+    let expect = |w: f32, reason: Refusal| {
+        let found = refused(client.request(place(w)), "a pose of no part")?;
+        ensure(found == reason, || format!("{found:?} instead of {reason:?}"))
+    };
+    expect(0.0, Refusal::BadNumber)?;
+    expect(1.0, Refusal::NoSuchPart { parts: 0 })?;
+    fine(client.request(ToDevice::Arm))?;
+    expect(1.0, Refusal::State(DeviceState::Armed))?;
+    fine(client.request(ToDevice::Disarm))?;
+    Ok("refused: no pose, no part, motors on".into())
 }
 
 /// One second of idle ticks: none is missed. Only on rigs with a real deadline, not on a PC's clock.

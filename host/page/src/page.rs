@@ -30,10 +30,10 @@ const STYLE: &str = "body{font:14px/1.5 system-ui,sans-serif;max-width:1240px;ma
     figure{margin:0;border:1px solid #d5dbe3;border-radius:6px;overflow:hidden}figcaption{padding:.4rem .7rem}img{display:block;width:100%}\
     .stuck{color:#9a3412}";
 
-/// The page of a sequence that was found for `assembly`, in the order of assembly.
+/// The page of a sequence that was found for `assembly`, in the order of assembly. `felt` has a sentence on how each step is felt, or nothing.
 ///
 /// Cost: a picture a step, on all cores.
-pub fn page(title: &str, assembly: &Assembly, found: &Sequence) -> String {
+pub fn page(title: &str, assembly: &Assembly, found: &Sequence, felt: &[String]) -> String {
     let report = report::sequence(assembly, found, Sense::Assembly);
     let title = escaped(title);
     let mut page = format!(
@@ -50,6 +50,13 @@ pub fn page(title: &str, assembly: &Assembly, found: &Sequence) -> String {
     }
     pictures(&mut page, assembly, found, &report);
     table(&mut page, &report);
+    if !felt.is_empty() {
+        page.push_str("<h2>Put together by a simulated hand, with contact</h2>\n<ol>\n");
+        for sentence in felt {
+            let _ = writeln!(page, "<li>{}</li>", escaped(sentence));
+        }
+        page.push_str("</ol>\n");
+    }
     if !report.pressed.is_empty() {
         page.push_str("<h2>Parts that overlap as placed in the file</h2>\n<table><tr><th>parts</th><th>depth, µm</th></tr>\n");
         for pressed in &report.pressed {

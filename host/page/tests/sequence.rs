@@ -40,7 +40,9 @@ fn pictures(page: &str) -> Vec<Vec<u8>> {
 #[test]
 fn each_step_has_its_picture_and_its_row() {
     let (assembly, found) = taken_apart("lab/data/fixture_row.step", "plate <1> & \"base\"");
-    let page = page("a row <of> pins", &assembly, &found);
+    let felt = vec!["pin <1>: in".to_owned(); found.steps.len()];
+    let page = page("a row <of> pins", &assembly, &found, &felt);
+    assert_eq!(page.matches("<li>pin &lt;1&gt;: in</li>").count(), felt.len());
     assert!(page.contains("<h1>a row &lt;of&gt; pins</h1>"), "{page}");
     assert!(!page.contains("<1>"));
     let count = found.steps.len();
@@ -78,7 +80,7 @@ fn what_stays_together_is_said() {
             proof: Some(mortise_task::Proof::Linked),
         },
     )];
-    let page = page("pair", &assembly, &found);
+    let page = page("pair", &assembly, &found, &[]);
     assert!(page.contains("do not come apart completely; 0 steps were found"));
     assert!(
         page.contains("by 250.0 µm at the least; linked: a closed curve"),
@@ -94,7 +96,7 @@ fn a_long_page_has_no_pictures() {
     let one = found.steps[0].clone();
     for (count, drawn) in [(100, 100), (101, 0)] {
         found.steps = vec![one.clone(); count];
-        let page = page("pair", &assembly, &found);
+        let page = page("pair", &assembly, &found, &[]);
         assert_eq!(pictures(&page).len(), drawn);
         assert_eq!(
             page.contains("Without pictures: more than 100 steps."),

@@ -1,23 +1,19 @@
 //! `mortise mobility`, `disassemble`, `assemble` and `features`: how the parts of an assembly are connected, move, and come apart.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use mortise_bake::{Grabbable, Request};
 use mortise_brep::LoadOptions;
 use mortise_output::{Existing, Output, lines};
-use mortise_rig::{Client, RigSpec};
-use mortise_scenario::ScenarioError;
-use mortise_scenario::insertions::{AssemblyScene, Inserted, Manner, play_insertions};
-use mortise_task::insertion::{Insertion, insertions};
+use mortise_rig::RigSpec;
 use mortise_task::removal::{Budget, Removal, remove};
 use mortise_task::report::{self, Sense, SequenceReport};
 use mortise_task::sequence::{self, Sequence, Step};
 use mortise_task::{Assembly, ports};
 use serde::Serialize;
 
+use super::played::{self, Played};
 use super::reading::Reading;
 
 /// Arguments of `mobility`.
@@ -155,131 +151,32 @@ pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
     let existing = Existing::from_force(args.force);
     let output = |path: &PathBuf| Output::new(path, existing, &[&args.search.file]);
     let output = args.report.as_ref().map(output).transpose()?;
-    let connect = |rig: &RigSpec| match rig {
-        RigSpec::Serial { .. } => Err(ScenarioError::NeedsSimulatedHand {
-            rig: rig.to_string(),
-            scenario: "steps of an assembly".into(),
-        }),
-        rig => Ok(Client::connect(&rig.lockstep())?),
-    };
-    let client = args.play.as_ref().map(connect).transpose()?;
+    let client = args.play.as_ref().map(played::connect).transpose()?;
     let assembly = read(&args.search.file, &args.search.reading)?;
     let all: Vec<usize> = (0..assembly.count()).collect();
     let found = sequence::disassemble(&assembly, &all, Duration::from_secs(args.search.time));
-    if let Some(output) = output {
-        let title = args
-            .search
-            .file
-            .file_stem()
-            .map_or("assembly".into(), |name| name.to_string_lossy());
-        output.write(mortise_page::page(&title, &assembly, &found).as_bytes())?;
-    }
     let report = report::sequence(&assembly, &found, Sense::Assembly);
-    let Some(client) = client else {
-        return print_sequence(&report, args.search.json);
-    };
     let json = args.search.json;
     let mut code = ExitCode::SUCCESS;
-    if !json {
+    if !json || client.is_none() {
         code = print_sequence(&report, json)?;
     }
-    let played = play(&assembly, &found, &client, json)?;
-    if !(report.verdict == "assembles" && played.all_in()) {
-        code = ExitCode::from(1);
+    let played = (client.as_ref())
+        .map(|client| played::play(&assembly, &found, client, json))
+        .transpose()?;
+    if let Some(output) = output {
+        let name = args.search.file.file_stem();
+        let title = name.map_or("assembly".into(), |name| name.to_string_lossy());
+        let felt = played.as_ref().map_or(&[][..], Played::felt);
+        output.write(mortise_page::page(&title, &assembly, &found, felt).as_bytes())?;
     }
-    if json {
-        lines::json(&PlayedReport {
-            sequence: report,
-            played,
-        })?;
-    } else {
-        lines::text(&played.words())?;
+    if let Some(played) = played {
+        if report.verdict != "assembles" || !played.all_in() {
+            code = ExitCode::from(1);
+        }
+        played.print(&report, json)?;
     }
     Ok(code)
-}
-
-/// A sequence, and how a simulated hand felt it.
-#[derive(Serialize)]
-struct PlayedReport<'a> {
-    #[serde(flatten)]
-    sequence: SequenceReport<'a>,
-    played: Played<'a>,
-}
-
-/// Steps that a simulated hand has done.
-#[derive(Serialize)]
-struct Played<'a> {
-    rig: String,
-    insertions: Vec<Inserted>,
-    /// Groups of parts that would have to move together, which one hand cannot do.
-    left_out: Vec<Vec<&'a str>>,
-}
-
-impl Played<'_> {
-    fn all_in(&self) -> bool {
-        self.left_out.is_empty() && self.insertions.iter().all(|inserted| inserted.in_place)
-    }
-
-    fn words(&self) -> String {
-        let put_in = self
-            .insertions
-            .iter()
-            .filter(|inserted| inserted.in_place)
-            .count();
-        let force = (self.insertions.iter()).fold(0.0, |most: f64, inserted| most.max(inserted.peak.force_n));
-        let missed: u32 = self.insertions.iter().map(|inserted| inserted.missed_ticks).sum();
-        let left_out: String = (self.left_out.iter())
-            .map(|parts| {
-                format!(
-                    "; not played: {} would move together, a hand holds one part",
-                    parts.join(", ")
-                )
-            })
-            .collect();
-        format!(
-            "by a simulated hand on {}: {put_in} of {} in, at most {force:.2} N, {missed} ticks missed{left_out}",
-            self.rig,
-            self.insertions.len(),
-        )
-    }
-}
-
-/// Plays the steps with a simulated hand; each is printed once it is known, or none with `json`.
-fn play<'a>(
-    assembly: &'a Assembly,
-    found: &Sequence,
-    client: &Client,
-    json: bool,
-) -> anyhow::Result<Played<'a>> {
-    let request = Request {
-        grabbable: Grabbable::All,
-        ..Request::default()
-    };
-    let planned = mortise_bake::plan(&assembly.model, &request, &|_| ControlFlow::Continue(()))?;
-    let scene = AssemblyScene {
-        model: &assembly.model,
-        image: &planned.image,
-        report: &planned.plan.report,
-    };
-    let steps = insertions(assembly, found);
-    let left_out = (steps.iter().filter_map(|step| step.as_ref().err()))
-        .map(|step| step.group.iter().map(|part| assembly.name(*part)).collect())
-        .collect();
-    let steps: Vec<Insertion> = steps.into_iter().flatten().collect();
-    let mut played = Vec::new();
-    let mut printed = Ok(());
-    play_insertions(client, &scene, &steps, &Manner::default(), &mut |inserted| {
-        if !json && printed.is_ok() {
-            printed = lines::text(&inserted.words());
-        }
-        played.push(inserted);
-    })?;
-    printed?;
-    Ok(Played {
-        rig: client.name().to_owned(),
-        insertions: played,
-        left_out,
-    })
 }
 
 /// Runs `disassemble`.

@@ -14,6 +14,7 @@ mod inspect;
 mod lab;
 mod manual;
 mod mistyped;
+mod played;
 mod ports;
 mod probe;
 mod reading;

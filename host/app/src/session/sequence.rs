@@ -98,7 +98,7 @@ impl Sequence {
             steps,
             verdict,
             stuck: report.stuck.iter().map(|stuck| stuck.words()).collect(),
-            page: mortise_page::page(title, assembly, found).into(),
+            page: mortise_page::page(title, assembly, found, &[]).into(),
             file: all.iter().map(|part| assembly.placement(*part)).collect(),
             radius,
         }

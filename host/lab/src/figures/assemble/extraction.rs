@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use mortise_task::removal::{Budget, Removal, remove};
 
 use super::assembly_file::load;
+use super::channels::Channel;
 use super::checked::{Checked, Overlap};
 use crate::LabError;
 use crate::figures::{Plan, Row};
@@ -39,12 +40,20 @@ const MEDIAN_S: f64 = 10.0;
 /// Largest overlap on a way, µm.
 const OVERLAP_UM: f64 = 10.0;
 
-pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let folder = cad.join("10_extraction");
-    let runs = if plan.quick { RUNS_QUICK } else { RUNS };
-    let (mut found, mut overlap) = (0, Overlap::default());
-    for name in TASKS {
-        let checked = Checked::load(&folder.join(format!("{name}.step")))?;
+/// Channels of the repository's own, by their seeds.
+const CHANNELS: [u64; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
+
+/// What runs of tasks came to.
+#[derive(Default)]
+struct Runs {
+    found: u32,
+    overlap: Overlap,
+}
+
+impl Runs {
+    /// Takes part 1 out of part 0, and measures the time.
+    fn run(&mut self, name: &str, checked: &Checked, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
+        let runs = runs(plan);
         let mut times = Vec::new();
         for seed in 0..runs {
             let start = Instant::now();
@@ -55,9 +64,9 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
             let removal = remove(&checked.assembly, &[1], &[0], &[], &budget);
             times.push(start.elapsed().as_secs_f64());
             if let Removal::Out(path) = removal {
-                found += 1;
+                self.found += 1;
                 if seed < CHECKED {
-                    overlap = overlap.and(checked.overlap(&[1], &[0], &path));
+                    self.overlap = self.overlap.and(checked.overlap(&[1], &[0], &path));
                 }
             } else {
                 eprintln!("{name}, seed {seed}: {removal:?}");
@@ -66,15 +75,45 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
         let what = format!("{name}, {runs} runs: median time to a way out");
         out(plan.timed(what, median(times.into_iter()), MEDIAN_S));
     }
-    let tasks = format!("{} tasks of extraction, {runs} runs each", TASKS.len());
-    let all = TASKS.len() as f64 * runs as f64;
-    out(Row::exactly(
-        format!("{tasks}: ways found"),
-        f64::from(found),
-        "ways",
-        all,
-    ));
-    overlaps(&tasks, overlap, out);
+
+    fn rows(self, what: &str, tasks: usize, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
+        let runs = runs(plan);
+        let what = format!("{tasks} {what}, {runs} runs each");
+        out(Row::exactly(
+            format!("{what}: ways found"),
+            f64::from(self.found),
+            "ways",
+            tasks as f64 * runs as f64,
+        ));
+        overlaps(&what, self.overlap, out);
+    }
+}
+
+fn runs(plan: &Plan<'_>) -> u64 {
+    if plan.quick { RUNS_QUICK } else { RUNS }
+}
+
+/// The repository's own tasks.
+pub(super) fn own(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let mut runs = Runs::default();
+    for seed in CHANNELS {
+        let channel = Channel::random(seed);
+        let file = channel.file()?;
+        let name = format!("spool in channel {seed} with {} bends", channel.bends());
+        runs.run(&name, &Checked::load(file.path())?, plan, out);
+    }
+    runs.rows("generated tasks of extraction", CHANNELS.len(), plan, out);
+    Ok(())
+}
+
+pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let folder = cad.join("10_extraction");
+    let mut runs = Runs::default();
+    for name in TASKS {
+        let checked = Checked::load(&folder.join(format!("{name}.step")))?;
+        runs.run(name, &checked, plan, out);
+    }
+    runs.rows("tasks of extraction", TASKS.len(), plan, out);
     for (name, held_um, least_um) in LOCKED {
         let assembly = load(&folder.join(format!("{name}.step")))?;
         let start = Instant::now();

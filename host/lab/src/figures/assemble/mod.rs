@@ -2,6 +2,7 @@
 //! with the search ([`checked`]).
 
 mod assembly_file;
+mod channels;
 mod checked;
 mod extraction;
 mod large;
@@ -17,6 +18,7 @@ const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to thei
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     sequences::own(out)?;
+    extraction::own(plan, out)?;
     large::measure(plan, out)?;
     played::own(out)?;
     let Some(cad) = corpus::folder() else {
