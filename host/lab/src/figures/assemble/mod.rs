@@ -18,7 +18,9 @@ const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to thei
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     sequences::own(out)?;
-    extraction::own(plan, out)?;
+    if !plan.quick {
+        extraction::own(plan, out)?;
+    }
     large::measure(plan, out)?;
     played::own(out)?;
     let Some(cad) = corpus::folder() else {
