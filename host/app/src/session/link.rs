@@ -385,10 +385,9 @@ impl Connection {
         });
     }
 
-    /// Lets the scene be uploaded as a whole, where it would only get its parts placed.
+    /// Lets the next scene be uploaded as a whole, where it would only get its parts placed.
     pub fn forget_scene(&mut self) {
         self.flashed = None;
-        self.scene_of = None;
     }
 
     /// Whether a reset of the scene on the board puts its parts, in the image's order, at `placements`.

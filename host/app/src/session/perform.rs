@@ -54,7 +54,13 @@ impl Session {
                 }
             }
             Intent::Disconnect => self.disconnect(),
-            Intent::Upload => self.upload(),
+            Intent::Upload => {
+                // Asked for, it is sent again, also where the board has it.
+                if let Some(connection) = self.connection_mut() {
+                    connection.forget_scene();
+                }
+                self.upload();
+            }
             Intent::CancelUpload => {
                 if let Some(connection) = self.connection() {
                     connection.cancel_upload();

@@ -50,6 +50,7 @@ impl Session {
             && !connection.resets_to(&placements)
         {
             connection.forget_scene();
+            connection.scene_of = None;
         }
     }
 
