@@ -206,8 +206,7 @@ pub enum ToDevice {
         /// [`MOTOR_TEST_FORCE`].
         force: f32,
     },
-    /// Put a part at a pose of its shape frame in the world: one step of an assembly begins where the step before ended. Only while disarmed;
-    /// lasts until a part is put elsewhere, or [`ToDevice::ResetScene`].
+    /// Put a part at a pose of its shape frame in the world. Only while disarmed. It stays there until it is moved, or [`ToDevice::ResetScene`].
     Place {
         /// Index in the scene; a fixed part may be placed too.
         part: u16,

@@ -126,7 +126,7 @@ fn a_late_copy_is_refused() {
 }
 
 proptest! {
-    /// Any bits as a pose: refused, or the part is exactly there, and the tick that follows commands no wrench.
+    /// Any bits as a pose: refused, or the part is exactly there.
     #[test]
     fn any_bits_are_refused_or_taken(bits in prop::array::uniform7(any::<u32>()), small in any::<bool>()) {
         let mut numbers = bits.map(f32::from_bits);

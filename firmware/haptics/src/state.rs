@@ -151,7 +151,7 @@ impl State {
         let pose = usable_pose(pose).ok_or(PlaceError::BadPose)?;
         placed.pose = pose;
         placed.center = pose.transform_point(placed.local_center);
-        self.hand.invalidate();
+        self.invalidate_coherence();
         Ok(())
     }
 

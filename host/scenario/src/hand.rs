@@ -1,9 +1,10 @@
 //! Scripts of a scenario's operator model for a simulated rig: the motion to the grip point, then the keyframes.
 
 use glam::{DQuat, DVec3};
-use mortise_protocol::message::{HandScript, Keyframe, WirePose};
+use mortise_protocol::message::{HandScript, Keyframe};
 
 use crate::scenario::{Hand, Key};
+use crate::wire::wire_pose;
 
 /// Tick rate of every simulated rig, Hz.
 pub const TICK_HZ: f64 = 1000.0;
@@ -11,13 +12,6 @@ pub const TICK_HZ: f64 = 1000.0;
 pub const REACH_TICKS: u32 = 300;
 /// Ticks in which it comes to rest there.
 pub const REST_TICKS: u32 = 200;
-
-fn wire_pose(position_mm: DVec3, orientation: DQuat) -> WirePose {
-    WirePose {
-        position: (1e-3 * position_mm).as_vec3().to_array(),
-        orientation: orientation.as_quat().to_array(),
-    }
-}
 
 fn with_keyframes(hand: &Hand, keyframes: impl Iterator<Item = Keyframe>) -> HandScript {
     HandScript {

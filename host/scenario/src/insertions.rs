@@ -10,15 +10,16 @@ use mortise_brep::CadModel;
 use mortise_guide::{Guide, GuideSettings};
 use mortise_mating::recognise::TargetId;
 use mortise_protocol::image::CRC;
-use mortise_protocol::limits::MAX_KEYFRAMES;
-use mortise_protocol::message::{DeviceState, HandScript, Keyframe, Telemetry, ToDevice, WirePose};
+use mortise_protocol::message::{DeviceState, HandScript, Keyframe, Telemetry, ToDevice};
 use mortise_rig::Client;
 use mortise_task::insertion::Insertion;
 
 use crate::error::ScenarioError;
 use crate::hand::{REACH_TICKS, REST_TICKS, TICK_HZ};
+pub use crate::hand_way::Manner;
+use crate::hand_way::{Way, between, rotation, scripts};
 use crate::run::{FADE_TICKS, Play};
-use crate::wire::{pose_mm, vector};
+use crate::wire::{pose_mm, to_wire, vector};
 
 /// Where parts are that take no part in a step, mm: beyond every other part, within what a board accepts.
 const AWAY_MM: DVec3 = DVec3::new(5e4, 0.0, 0.0);
@@ -28,8 +29,6 @@ pub const IN_PLACE_MM: f64 = 0.05;
 const DESIGNED: (f64, f64) = (0.005, 0.001);
 /// Ticks between answers to samples.
 const HEED_TICKS: u16 = 10;
-/// Share of the time of a way after which the hand is off it by the full amount.
-const OFF_AFTER: f64 = 0.15;
 /// Ticks for which the hand waits in place at the end, and after each correction.
 const SETTLE_TICKS: u32 = 300;
 /// Attempts to bring a part in.
@@ -47,40 +46,6 @@ pub struct AssemblyScene<'a> {
     pub image: &'a [u8],
     /// The baker's report.
     pub report: &'a BakeReport,
-}
-
-/// How the hand moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Manner {
-    /// Speed of the part's centre of mass, mm/s.
-    pub speed_mm_s: f64,
-    /// Angular speed, rad/s.
-    pub speed_rad_s: f64,
-    /// Largest distance of the hand from its way, mm: reached early, and gone at the end. Along the direction to which [`Self::off_to`] turns.
-    pub off_mm: f64,
-    /// Largest turn off its way, radians.
-    pub off_rad: f64,
-    /// Direction in which the hand is off, and axis about which it is turned off.
-    pub off_to: DVec3,
-    /// Amplitude of the tremor, mm.
-    pub tremor_mm: f64,
-    /// Frequency of the tremor, Hz.
-    pub tremor_hz: f32,
-}
-
-impl Default for Manner {
-    /// 40 mm/s, 0.5 mm and 0.5° off, and a tremor of 0.2 mm at 10 Hz.
-    fn default() -> Self {
-        Self {
-            speed_mm_s: 40.0,
-            speed_rad_s: 1.0,
-            off_mm: 0.5,
-            off_rad: 0.5f64.to_radians(),
-            off_to: DVec3::new(0.6, -0.64, 0.48),
-            tremor_mm: 0.2,
-            tremor_hz: 10.0,
-        }
-    }
 }
 
 /// A moment of an insertion.
@@ -306,7 +271,7 @@ impl<'a> Bench<'a> {
             }
             self.play.client.request(ToDevice::Place {
                 part: index as u16,
-                pose: wire_pose(&pose),
+                pose: to_wire(&pose),
             })?;
             self.placed[part] = Some(pose);
         }
@@ -331,7 +296,7 @@ impl<'a> Bench<'a> {
     ) -> Result<(), ScenarioError> {
         let keyframes = keys.iter().map(|&(tick, pose)| Keyframe {
             tick,
-            pose: wire_pose(&pose),
+            pose: to_wire(&pose),
             push: [0.0; 3],
         });
         // Springs and dampers of the hand in the scenarios.
@@ -438,121 +403,4 @@ impl<'a> Bench<'a> {
 /// Last pose of the held part, mm.
 fn last_pose(samples: &[Telemetry]) -> Option<DAffine3> {
     (samples.iter().rev()).find_map(|sample| sample.object.map(|(_, pose)| pose_mm(&pose)))
-}
-
-/// Targets of the hand along an insertion, mm, with their ticks.
-struct Way {
-    keys: Vec<(u32, DAffine3)>,
-}
-
-impl Way {
-    fn new(model: &CadModel, insertion: &Insertion, manner: &Manner) -> Self {
-        let center = model.shapes[model.parts[insertion.part].shape].center_of_mass;
-        // The handle is at the centre of mass, and turned as the world at the grab.
-        let grip = insertion.way[0].inverse()
-            * DAffine3::from_translation(insertion.way[0].transform_point3(center));
-        let timed = timed(
-            &insertion.way.iter().map(|pose| *pose * grip).collect::<Vec<_>>(),
-            manner,
-        );
-        let end = timed.last().map_or(0.0, |(t, _)| *t);
-        let key = |&(t, pose): &(f64, DAffine3)| {
-            let share = if t < OFF_AFTER * end {
-                t / (OFF_AFTER * end)
-            } else {
-                (end - t) / ((1.0 - OFF_AFTER) * end).max(f64::MIN_POSITIVE)
-            };
-            ((t * TICK_HZ).round() as u32, off_by(&pose, share, manner))
-        };
-        let mut keys: Vec<(u32, DAffine3)> = timed.iter().map(key).collect();
-        keys.dedup_by_key(|(tick, _)| *tick);
-        Self { keys }
-    }
-
-    fn grip(&self) -> DAffine3 {
-        self.keys[0].1
-    }
-
-    /// The way back from where the hand is after it.
-    fn back(&self, from: DAffine3) -> Vec<(u32, DAffine3)> {
-        let end = self.keys.last().map_or(0, |(tick, _)| *tick);
-        let mut keys: Vec<_> = self
-            .keys
-            .iter()
-            .rev()
-            .map(|(tick, pose)| (end - tick, *pose))
-            .collect();
-        keys[0].1 = from;
-        keys
-    }
-}
-
-/// Timed targets in scripts as long as a board takes, each starting where the one before ends.
-fn scripts(keys: &[(u32, DAffine3)]) -> Vec<Vec<(u32, DAffine3)>> {
-    let mut scripts = Vec::new();
-    let mut first = 0;
-    while first + 1 < keys.len() {
-        let last = (first + MAX_KEYFRAMES - 1).min(keys.len() - 1);
-        let start = keys[first].0;
-        scripts.push(
-            keys[first..=last]
-                .iter()
-                .map(|(tick, pose)| (tick - start, *pose))
-                .collect(),
-        );
-        first = last;
-    }
-    scripts
-}
-
-/// Poses with the times at which a hand reaches them, and one more where it is off its way by the full amount.
-fn timed(poses: &[DAffine3], manner: &Manner) -> Vec<(f64, DAffine3)> {
-    let mut t = 0.0;
-    let mut timed = vec![(t, poses[0])];
-    for pair in poses.windows(2) {
-        let (slide, turn) = between(&pair[0], &pair[1]);
-        t += (slide.length() / manner.speed_mm_s).max(turn.length() / manner.speed_rad_s);
-        timed.push((t, pair[1]));
-    }
-    let off = OFF_AFTER * t;
-    if let Some(after) = timed
-        .iter()
-        .position(|(t, _)| *t > off)
-        .filter(|after| *after > 0)
-    {
-        let ((t0, a), (t1, b)) = (timed[after - 1], timed[after]);
-        let (slide, turn) = between(&a, &b);
-        let share = (off - t0) / (t1 - t0);
-        let turn = DQuat::from_scaled_axis(turn * share);
-        let pose = DAffine3::from_rotation_translation(turn * rotation(&a), a.translation + slide * share);
-        timed.insert(after, (off, pose));
-    }
-    timed
-}
-
-/// Translation and rotation vector from one pose to another.
-fn between(a: &DAffine3, b: &DAffine3) -> (DVec3, DVec3) {
-    let turn = rotation(b) * rotation(a).inverse();
-    let turn = if turn.w < 0.0 { -turn } else { turn };
-    (b.translation - a.translation, turn.to_scaled_axis())
-}
-
-fn rotation(pose: &DAffine3) -> DQuat {
-    DQuat::from_mat3(&pose.matrix3).normalize()
-}
-
-fn off_by(pose: &DAffine3, share: f64, manner: &Manner) -> DAffine3 {
-    let to = manner.off_to.normalize_or(DVec3::X);
-    let turn = DQuat::from_axis_angle(to, manner.off_rad * share);
-    DAffine3::from_rotation_translation(
-        turn * rotation(pose),
-        pose.translation + to * (manner.off_mm * share),
-    )
-}
-
-fn wire_pose(pose: &DAffine3) -> WirePose {
-    WirePose {
-        position: (1e-3 * pose.translation).as_vec3().to_array(),
-        orientation: rotation(pose).as_quat().to_array(),
-    }
 }

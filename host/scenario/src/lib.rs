@@ -6,6 +6,7 @@
 
 mod error;
 mod hand;
+mod hand_way;
 pub mod insertions;
 pub mod measure;
 mod outcome;

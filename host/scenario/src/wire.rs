@@ -13,6 +13,19 @@ pub fn pose_mm(pose: &WirePose) -> DAffine3 {
     )
 }
 
+/// A pose in millimetres for the wire.
+pub(crate) fn to_wire(pose: &DAffine3) -> WirePose {
+    wire_pose(pose.translation, DQuat::from_mat3(&pose.matrix3).normalize())
+}
+
+/// A position, mm, and an orientation for the wire.
+pub(crate) fn wire_pose(position_mm: DVec3, orientation: DQuat) -> WirePose {
+    WirePose {
+        position: (1e-3 * position_mm).as_vec3().to_array(),
+        orientation: orientation.as_quat().to_array(),
+    }
+}
+
 /// A wire vector, in its own unit.
 pub fn vector(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))

@@ -123,6 +123,9 @@ impl Played {
     }
 
     fn words(&self) -> String {
+        if self.insertions.is_empty() && self.left_out.is_empty() {
+            return "nothing to play: no step was found".into();
+        }
         let put_in = (self.insertions.iter())
             .filter(|inserted| inserted.in_place)
             .count();

@@ -57,7 +57,7 @@ impl Session {
             && self.device() == Some(DeviceState::Idle)
             && obstacle(self, &Intent::Upload).is_none()
         {
-            self.upload();
+            self.upload(false);
         }
     }
 }

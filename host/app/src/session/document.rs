@@ -10,8 +10,8 @@ use mortise_bake::Baked;
 use mortise_brep::{CadModel, LoadOptions, load_step_while};
 use sha2::{Digest as _, Sha256};
 
+use super::flashed::Flashed;
 use super::insertion::{self, Insertion};
-use super::placed_scene::with_placements;
 use super::tree::{Branch, tree};
 use super::verdict::Watch;
 use crate::display::extent::Extent;
@@ -186,13 +186,7 @@ impl Document {
 
     /// The scene to send to a board, once baked: with the parts where they are placed.
     pub fn scene(&self) -> Option<Arc<Baked>> {
-        let baked = self.baked.as_ref()?;
-        if !self.is_placed() {
-            return Some(Arc::clone(baked));
-        }
-        let image = with_placements(&baked.image, &self.scene_placements()?)?;
-        let report = baked.report.clone();
-        Some(Arc::new(Baked { image, report }))
+        Flashed::new(self.baked.clone()?, self.scene_placements()?).image()
     }
 
     /// Name of a part.

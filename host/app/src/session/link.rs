@@ -357,9 +357,10 @@ impl Connection {
     }
 
     /// Brings a scene onto the board with its parts at `placements`, in the image's order, mm: an image that is there already gets its parts placed, which
-    /// writes no flash; any other is uploaded.
-    pub fn send_scene(&mut self, baked: Arc<Baked>, placements: Vec<DAffine3>, generation: u64) {
-        if let Some(flashed) = self.flashed.as_ref().filter(|flashed| flashed.has(&baked)) {
+    /// writes no flash; any other is uploaded, and with `whole` this one, too.
+    pub fn send_scene(&mut self, baked: Arc<Baked>, placements: Vec<DAffine3>, generation: u64, whole: bool) {
+        let there = (self.flashed.as_ref()).filter(|flashed| !whole && flashed.has(&baked));
+        if let Some(flashed) = there {
             let messages = flashed.moved_to(&placements);
             // Nothing else is placed or uploaded meanwhile.
             self.upload = Some(UploadProgress { sent: 0, total: 1 });
@@ -376,7 +377,6 @@ impl Connection {
         });
         self.upload_since = Instant::now();
         self.upload_cancel = Cancel::default();
-        self.flashed = None;
         self.sending = Some(sent);
         self.command(Command::Upload {
             baked: image,
@@ -385,9 +385,10 @@ impl Connection {
         });
     }
 
-    /// Lets the next scene be uploaded as a whole, where it would only get its parts placed.
+    /// Takes the scene for one that is not on the board: it is uploaded anew.
     pub fn forget_scene(&mut self) {
         self.flashed = None;
+        self.scene_of = None;
     }
 
     /// Whether a reset of the scene on the board puts its parts, in the image's order, at `placements`.
@@ -402,9 +403,10 @@ impl Connection {
         let uploaded = sent.is_some();
         match (sent, done) {
             (Some(sent), true) => self.flashed = Some(sent),
-            (None, true) => {}
-            // Which scene is there, and where its parts are, is no longer known.
-            (_, false) => self.flashed = None,
+            // Where its parts are is no longer known.
+            (None, false) => self.flashed = None,
+            // An upload that did not end leaves the scene that was there.
+            (None, true) | (Some(_), false) => {}
         }
         uploaded
     }

@@ -54,13 +54,8 @@ impl Session {
                 }
             }
             Intent::Disconnect => self.disconnect(),
-            Intent::Upload => {
-                // Asked for, it is sent again, also where the board has it.
-                if let Some(connection) = self.connection_mut() {
-                    connection.forget_scene();
-                }
-                self.upload();
-            }
+            // Asked for, it is sent again, also where the board has it.
+            Intent::Upload => self.upload(true),
             Intent::CancelUpload => {
                 if let Some(connection) = self.connection() {
                     connection.cancel_upload();
@@ -270,19 +265,17 @@ impl Session {
         }
     }
 
-    pub(super) fn upload(&mut self) {
+    /// Brings the scene onto the board: its parts alone where it is there already, unless as a `whole`.
+    pub(super) fn upload(&mut self, whole: bool) {
         let Some(document) = &self.document else { return };
         let generation = document.generation;
         let (Some(baked), Some(placements)) = (document.baked.clone(), document.scene_placements()) else {
             return;
         };
         // A recording has no places but those of images.
-        let records = self.recording.is_some();
+        let whole = whole || self.recording.is_some();
         if let Some(connection) = self.connection_mut() {
-            if records {
-                connection.forget_scene();
-            }
-            connection.send_scene(baked, placements, generation);
+            connection.send_scene(baked, placements, generation, whole);
         }
     }
 

@@ -50,7 +50,6 @@ impl Session {
             && !connection.resets_to(&placements)
         {
             connection.forget_scene();
-            connection.scene_of = None;
         }
     }
 

@@ -194,6 +194,9 @@ fn sending_the_scene_can_be_cancelled_and_begun_again() {
         "the previous collision model stays in use"
     );
     assert!(worst(session) < Severity::Warning);
+    // Its parts can still be put back.
+    harness.state_mut().session.act(Intent::ResetScene);
+    assert!(harness.state().session.scene_is_on_board());
     harness.state_mut().session.act(Intent::Upload);
     until(&mut harness, "uploaded completely", |s| {
         s.notes

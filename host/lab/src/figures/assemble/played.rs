@@ -34,6 +34,8 @@ const OTHERS: [&str; 13] = [
     "10_extraction/ubolt_plate.step",
     "real/as1-oc-214.stp",
 ];
+/// Steps of these that bring two groups together: the leaves of the hinge with their bushes.
+const GROUPS: usize = 1;
 /// Hands that put the motor together, each off in a direction of its own.
 const HANDS: usize = 10;
 const SEED: u64 = 18;
@@ -159,9 +161,10 @@ pub(super) fn measure(cad: &Path, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
     for name in OTHERS {
         let file = cad.join(name);
         let ready = Ready::new(&file, load(&file)?)?;
-        wanted += ready.steps.len();
+        wanted += ready.assembly.count() - 1;
         others.extend(ready.play(&SIM, &Manner::default())?);
     }
+    wanted -= GROUPS;
     let what = format!("{} other assemblies and tasks of extraction played", OTHERS.len());
     rows(&what, &others, wanted, out);
     caught(&what, &others, out);
