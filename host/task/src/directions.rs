@@ -152,6 +152,67 @@ pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> C
     }
 }
 
+/// Smallest sine between two planes that have a direction in common.
+const CROSSING: f64 = 5e-2;
+
+/// Directions in which a moved group slides between the planes that face it within `within` mm: each lies in two of these planes. Those with most samples nearby first.
+///
+/// A part in a channel touches neither wall and slides along no normal; the line that a wall and the floor have in common is its way.
+pub(crate) fn between_planes(
+    assembly: &Assembly,
+    group: &Moved<'_>,
+    others: &[usize],
+    within: f64,
+) -> Vec<DVec3> {
+    let mut normals: Vec<(f64, DVec3)> = Vec::new();
+    for &a in group.parts {
+        let (al, ah) = assembly.bounds(a, group.by);
+        for &b in others {
+            let (bl, bh) = assembly.bounds(b, glam::DAffine3::IDENTITY);
+            if (al - bh).max(bl - ah).max_element() > within {
+                continue;
+            }
+            let (pa, pb) = (
+                assembly.placed(a, group.by),
+                assembly.placed(b, glam::DAffine3::IDENTITY),
+            );
+            let mut each = |n| add(&mut normals, 1.0, n, same_direction);
+            facing_planes(pa, pb, within, &mut each);
+            facing_planes(pb, pa, within, &mut each);
+        }
+    }
+    let mut directions: Vec<(f64, DVec3)> = Vec::new();
+    for (i, (m, a)) in normals.iter().enumerate() {
+        for (n, b) in &normals[i + 1..] {
+            let line = a.cross(*b);
+            if line.length() > CROSSING {
+                add(&mut directions, m.min(*n), line.normalize(), same_direction);
+            }
+        }
+    }
+    directions.sort_by(|a, b| b.0.total_cmp(&a.0));
+    directions.into_iter().map(|(_, d)| d).collect()
+}
+
+/// Normals, in the assembly's frame, of the planes of `b` that are nearest to samples of `a` and within reach of them.
+fn facing_planes(a: Placed<'_>, b: Placed<'_>, within: f64, each: &mut dyn FnMut(DVec3)) {
+    let to = b.pose.inverse() * a.pose;
+    let faces = &b.body.surface().shape().faces;
+    for sample in a.body.samples() {
+        let p = to.transform_point3(sample.position);
+        if b.body.exceeds(p, within) {
+            continue;
+        }
+        let plane = (b.body.nearest(p)).and_then(|near| match faces.get(near.face as usize)?.surface {
+            Surface::Plane { frame } => Some(frame.z),
+            _ => None,
+        });
+        if let Some(normal) = plane {
+            each(b.pose.transform_vector3(normal));
+        }
+    }
+}
+
 fn add<T: Copy>(list: &mut Vec<(f64, T)>, weight: f64, item: T, same: fn(T, T) -> bool) {
     match list.iter_mut().find(|(_, other)| same(item, *other)) {
         Some((sum, _)) => *sum += weight,

@@ -10,12 +10,13 @@
 //! Each proof also holds while the parts overlap by less than a stated depth. None found does not mean that the parts come apart.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
-use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{Curve, Surface};
 
 use crate::clearance::Placed;
+use crate::disc::disc_depth;
 use crate::linking::Loop;
 use crate::passage::widest_below;
 use crate::skeleton::Skeleton;
@@ -32,9 +33,8 @@ const LEAST_MM: f64 = 1e-3;
 /// Accuracy of the bound of a passage, mm, and balls that are tried.
 const WITHIN_MM: f64 = 2e-4;
 const BALLS: usize = 3;
-/// Points of each side of an opening that are tried as ends, and rings of a disc that are looked at.
+/// Points of each side of an opening that are tried as ends, beside those on axes.
 const TRIED: usize = 12;
-const DISC_STEPS: f64 = 16.0;
 /// Most curves of a skeleton.
 const CYCLES: usize = 4;
 
@@ -214,8 +214,13 @@ impl<'a> Side<'a> {
             if !tree.places.iter().any(beyond) {
                 continue;
             }
-            points.sort_by(|&i, &j| self.skeleton.depths[j].total_cmp(&self.skeleton.depths[i]));
-            points.truncate(TRIED);
+            let axial = |i: &usize| self.skeleton.axial.contains(&(*i as u32));
+            points.sort_by(|i, j| {
+                let deeper = self.skeleton.depths[*j].total_cmp(&self.skeleton.depths[*i]);
+                axial(j).cmp(&axial(i)).then(deeper)
+            });
+            let count = points.iter().filter(|i| axial(i)).count();
+            points.truncate(count + TRIED);
             ends.extend(
                 points
                     .iter()
@@ -255,7 +260,13 @@ impl<'a> Side<'a> {
         let disc = End {
             at,
             radius_mm,
-            lacks_mm: self.disc_depth(self.skeleton.points[at], normal, radius_mm) - curve.deviation,
+            lacks_mm: disc_depth(
+                &|p| self.distance(p),
+                self.skeleton.points[at],
+                normal,
+                radius_mm,
+                LEAST_MM,
+            ) - curve.deviation,
         };
         let end = if ball.lacks_mm >= disc.lacks_mm {
             ball
@@ -263,28 +274,6 @@ impl<'a> Side<'a> {
             disc
         };
         (end.lacks_mm >= LEAST_MM).then_some(end)
-    }
-
-    /// Least depth of a disc's points below the surface, at least, mm; 0 where it is not inside.
-    fn disc_depth(&self, center: DVec3, normal: DVec3, radius: f64) -> f64 {
-        let x = normal.any_orthonormal_vector();
-        let y = normal.cross(x);
-        let step = radius / DISC_STEPS;
-        let mut least = f64::INFINITY;
-        // From the rim inwards: most discs that are too large are too large there.
-        for ring in (0..=DISC_STEPS as usize).rev() {
-            let r = step * ring as f64;
-            let count = (TAU * r / step).ceil().max(1.0) as usize;
-            for i in 0..count {
-                let (s, c) = (TAU * i as f64 / count as f64).sin_cos();
-                // No point of the disc is farther from all of these than this.
-                least = least.min(-self.distance(center + (x * c + y * s) * r) - step * FRAC_1_SQRT_2);
-                if least <= 0.0 {
-                    return 0.0;
-                }
-            }
-        }
-        least
     }
 
     /// A proof by a ball of this part inside the other.

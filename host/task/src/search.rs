@@ -6,11 +6,12 @@ use glam::{DAffine3, DVec3};
 
 use crate::assembly::{Assembly, Moved, SEARCH_STEP_MM};
 use crate::cone::cone;
-use crate::directions::{Line, candidates, contact_normals, same_line};
-use crate::leg::{Kind, Missed};
+use crate::directions::{Line, between_planes, candidates, contact_normals, same_direction, same_line};
+use crate::leg::{Kind, Missed, Opening};
 use crate::mobility::{PLAY_MM, leaving_mm};
 use crate::motion::Motion;
 use crate::race::Clock;
+use crate::symmetry::turns_into_itself;
 use crate::way::Path;
 
 /// Displacement past its present range by which a blocked motion is tested, as a share of the group's size and its limits, mm of travel: a larger one overlooks
@@ -22,6 +23,8 @@ const SAME_POSE: (f64, f64) = (0.4, 0.03);
 /// Directions and axes used at each place.
 const DIRECTIONS: usize = 5;
 const AXES: usize = 4;
+/// Directions between planes nearby that are used at each place and at the end of each leg.
+const BETWEEN: usize = 3;
 
 /// State of a search.
 pub(crate) struct Search<'a> {
@@ -206,29 +209,60 @@ impl Search<'_> {
                     reached.extend(self.reopening(&group, p, reach, q));
                 }
                 for opening in reached {
-                    let leg = p.over(opening.at);
-                    let by = opening.shift() * leg.at(1.0) * place.by;
-                    if self.is_new(by) {
-                        self.seen.push(by);
-                        let mut legs = place.legs.clone();
-                        legs.push(leg);
-                        legs.extend(opening.shift.map(Motion::slide));
-                        found.push((opening.gain, Place { by, legs }));
-                    }
+                    found.extend(self.reached(place, p, &opening));
+                }
+            }
+            for q in self.at_the_end(&group, p, reach, &kinds) {
+                if let Some(opening) = self.opening(&group, p, [0.0, reach], &q, 0.0) {
+                    found.extend(self.reached(place, p, &opening));
                 }
             }
         }
         found
     }
 
+    /// The place at an opening along leg `p`, where it is new, with its gain.
+    fn reached(&mut self, place: &Place, p: &Kind, opening: &Opening) -> Option<(f64, Place)> {
+        let leg = p.over(opening.at);
+        let by = opening.shift() * leg.at(1.0) * place.by;
+        if !self.is_new(by) {
+            return None;
+        }
+        self.seen.push(by);
+        let mut legs = place.legs.clone();
+        legs.push(leg);
+        legs.extend(opening.shift.map(Motion::slide));
+        Some((opening.gain, Place { by, legs }))
+    }
+
+    /// Slides between the planes that are near at the end of leg `p`, in directions that no kind has: beyond a bend of a channel.
+    fn at_the_end(&self, group: &Moved<'_>, p: &Kind, reach: f64, kinds: &[Kind]) -> Vec<Kind> {
+        let end = self.group(p.over(reach).at(1.0) * group.by);
+        let mut found = between_planes(self.assembly, &end, self.others, self.opening_mm);
+        found.retain(|d| {
+            !kinds
+                .iter()
+                .any(|k| matches!(k, Kind::Slide(known) if same_direction(*known, *d)))
+        });
+        found.truncate(BETWEEN);
+        (found.into_iter())
+            .flat_map(|d| [Kind::Slide(d), Kind::Slide(-d)])
+            .collect()
+    }
+
     fn kinds(&self, group: &Moved<'_>) -> Vec<Kind> {
         let found = candidates(self.assembly, group, self.others);
-        let directions: Vec<DVec3> = found.directions.iter().take(DIRECTIONS).copied().collect();
+        let mut directions: Vec<DVec3> = found.directions.iter().take(DIRECTIONS).copied().collect();
+        let between = between_planes(self.assembly, group, self.others, self.opening_mm);
+        let new = |d: &DVec3| !directions.iter().any(|known| same_direction(*known, *d));
+        let between: Vec<DVec3> = between.into_iter().filter(new).take(BETWEEN).collect();
+        directions.extend(between);
         let mut kinds: Vec<Kind> = directions
             .iter()
             .flat_map(|&d| [Kind::Slide(d), Kind::Slide(-d)])
             .collect();
         let mut axes: Vec<Line> = found.axes.into_iter().take(AXES).collect();
+        axes.retain(|axis| !turns_into_itself(self.assembly, group, axis));
         // Where the group is held narrowly it can tilt.
         if self.tilts
             && let Some(pivot) = self.pivot(group)

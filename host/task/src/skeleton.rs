@@ -1,9 +1,10 @@
 //! The inside of a part as a graph: points deep in the material and segments between them that stay in it.
 
 use glam::DVec3;
-use mortise_brep::Surface;
+use mortise_brep::{Curve, Shape, Surface};
 
 use crate::body::Body;
+use crate::directions::{Line, same_line};
 
 /// Cells along the diagonal of the box at first, most divisions, and most cells of a level.
 const FIRST: f64 = 16.0;
@@ -11,6 +12,8 @@ const LEVELS: usize = 3;
 const MOST_CELLS: usize = 8_000;
 /// Most points that are made deeper by an ascent.
 const BALLS: usize = 8;
+/// Most points on axes.
+const AXIAL: usize = 32;
 /// Last step of such an ascent, mm.
 const LAST_MM: f64 = 1e-4;
 /// Smallest depth of a segment, mm.
@@ -23,6 +26,8 @@ pub(crate) struct Skeleton {
     /// Depth of each point below the surface, mm.
     pub depths: Vec<f64>,
     pub segments: Vec<Segment>,
+    /// Points on the axes of circles, halfway between two of them: middles of heads, collars and discs.
+    pub axial: Vec<u32>,
 }
 
 /// A segment inside the material.
@@ -101,13 +106,13 @@ pub(crate) fn skeleton(body: &Body) -> Skeleton {
         }
     }
     for (p, depth) in balls {
-        let id = found.points.len() as u32;
-        found.points.push(p);
-        found.depths.push(depth);
-        for j in 0..id {
-            if found.points[j as usize].distance(p) < 2.0 * cell {
-                found.join(id, j);
-            }
+        found.add(p, depth, cell);
+    }
+    for p in between_circles(body.surface().shape()) {
+        let depth = -body.distance_once(p);
+        if depth > 0.0 {
+            let id = found.add(p, depth, cell);
+            found.axial.push(id);
         }
     }
     // Order of a map is not repeatable.
@@ -118,6 +123,19 @@ pub(crate) fn skeleton(body: &Body) -> Skeleton {
 }
 
 impl Skeleton {
+    /// Adds a point, with segments to those nearby.
+    fn add(&mut self, p: DVec3, depth: f64, cell: f64) -> u32 {
+        let id = self.points.len() as u32;
+        self.points.push(p);
+        self.depths.push(depth);
+        for j in 0..id {
+            if self.points[j as usize].distance(p) < 2.0 * cell {
+                self.join(id, j);
+            }
+        }
+        id
+    }
+
     fn join(&mut self, i: u32, j: u32) {
         let [a, b] = [i, j].map(|k| k as usize);
         let depth = (self.depths[a] + self.depths[b] - self.points[a].distance(self.points[b])) / 2.0;
@@ -125,6 +143,37 @@ impl Skeleton {
             self.segments.push(Segment { ends: [i, j], depth });
         }
     }
+}
+
+/// Places halfway between the middles of circles that follow each other on an axis, of the axes with most circles first.
+fn between_circles(shape: &Shape) -> Vec<DVec3> {
+    let mut axes: Vec<(Line, Vec<f64>)> = Vec::new();
+    for edge in &shape.edges {
+        let Curve::Circle { frame, .. } = edge.curve else {
+            continue;
+        };
+        let line = Line {
+            point: frame.origin,
+            direction: frame.z,
+        };
+        let known = axes.iter().position(|(known, _)| same_line(*known, line));
+        let at = known.unwrap_or_else(|| {
+            axes.push((line, Vec::new()));
+            axes.len() - 1
+        });
+        let (axis, heights) = &mut axes[at];
+        heights.push((frame.origin - axis.point).dot(axis.direction));
+    }
+    axes.sort_by_key(|(_, heights)| std::cmp::Reverse(heights.len()));
+    let mut found = Vec::new();
+    for (axis, mut heights) in axes {
+        heights.sort_by(f64::total_cmp);
+        heights.dedup_by(|a, b| (*a - *b).abs() < LEAST_MM);
+        let middles = heights.windows(2).map(|w| (w[0] + w[1]) / 2.0);
+        found.extend(middles.map(|h| axis.point + axis.direction * h));
+    }
+    found.truncate(AXIAL);
+    found
 }
 
 /// The deepest place near `p`, by ever smaller steps, and its depth.
