@@ -33,8 +33,10 @@ const LEAST_MM: f64 = 1e-3;
 /// Accuracy of the bound of a passage, mm, and balls that are tried.
 const WITHIN_MM: f64 = 2e-4;
 const BALLS: usize = 3;
-/// Points of each side of an opening that are tried as ends, beside those on axes.
+/// Points of each side of an opening that are tried as ends, beside those on axes; divisions of the discs of either.
 const TRIED: usize = 12;
+const PIECES: usize = 300;
+const PIECES_AXIAL: usize = 60_000;
 /// Most curves of a skeleton.
 const CYCLES: usize = 4;
 
@@ -256,24 +258,23 @@ impl<'a> Side<'a> {
             radius_mm: depth,
             lacks_mm: depth - opening,
         };
+        if ball.lacks_mm >= LEAST_MM {
+            return Some(ball);
+        }
         let radius_mm = opening + LEAST_MM;
+        let pieces = if self.skeleton.axial.contains(&(at as u32)) {
+            PIECES_AXIAL
+        } else {
+            PIECES
+        };
+        let center = self.skeleton.points[at];
+        let depth = disc_depth(&|p| self.distance(p), center, normal, radius_mm, LEAST_MM, pieces);
         let disc = End {
             at,
             radius_mm,
-            lacks_mm: disc_depth(
-                &|p| self.distance(p),
-                self.skeleton.points[at],
-                normal,
-                radius_mm,
-                LEAST_MM,
-            ) - curve.deviation,
+            lacks_mm: depth - curve.deviation,
         };
-        let end = if ball.lacks_mm >= disc.lacks_mm {
-            ball
-        } else {
-            disc
-        };
-        (end.lacks_mm >= LEAST_MM).then_some(end)
+        (disc.lacks_mm >= LEAST_MM).then_some(disc)
     }
 
     /// A proof by a ball of this part inside the other.

@@ -34,6 +34,10 @@ pub(crate) struct Search<'a> {
     pub extra: &'a [DVec3],
     pub clock: &'a Clock<'a>,
     pub seen: Vec<DAffine3>,
+    /// Poses from which motions were tried.
+    expanded: Vec<DAffine3>,
+    /// Box of the group in place.
+    start: (DVec3, DVec3),
     /// Narrowly missed openings, least overlap first.
     pub missed: Vec<Missed>,
     pub out_of_time: bool,
@@ -60,6 +64,8 @@ impl<'a> Search<'a> {
             extra,
             clock,
             seen: vec![DAffine3::IDENTITY],
+            expanded: Vec::new(),
+            start: (low, high),
             missed: Vec::new(),
             out_of_time: false,
             tilts: false,
@@ -137,6 +143,7 @@ impl Search<'_> {
         }
         self.tilts = true;
         self.seen.truncate(1);
+        self.expanded.clear();
         self.legs()
     }
 
@@ -145,12 +152,16 @@ impl Search<'_> {
             by: DAffine3::IDENTITY,
             legs: Vec::new(),
         }]);
-        // The newest place and the oldest one in turn. The way through a maze is deep; but where a part turns freely everywhere, depth first adds turn after turn
-        // and misses a way of two legs.
+        // The place farthest from all known ones and the oldest one in turn. The way through a maze is deep; but where a part turns freely everywhere, depth first adds
+        // turn after turn and misses a way of two legs.
         let mut deep = false;
         loop {
             deep = !deep;
-            let place = (if deep { open.pop_back() } else { open.pop_front() })?;
+            let place = (if deep {
+                self.farthest(&mut open)
+            } else {
+                open.pop_front()
+            })?;
             if self.clock.is_over() {
                 self.out_of_time = true;
                 return None;
@@ -158,6 +169,7 @@ impl Search<'_> {
             if place.legs.len() + 1 > self.clock.budget.legs {
                 continue;
             }
+            self.expanded.push(place.by);
             let mut next = self.openings(&place);
             // The largest gain is expanded first.
             next.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -176,6 +188,36 @@ impl Search<'_> {
         }
     }
 
+    /// Takes out the place that is farthest from all from which motions were tried.
+    fn farthest(&self, open: &mut VecDeque<Place>) -> Option<Place> {
+        let far = |place: &Place| {
+            (self.expanded.iter().map(|known| self.apart_mm(known, &place.by))).fold(f64::INFINITY, f64::min)
+        };
+        let distances = open.iter().map(far).enumerate();
+        let (at, _) = distances.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        open.remove(at)
+    }
+
+    /// How far the group moves between two poses: its middle, and by a turn a point half as far from there as its corners, mm.
+    fn apart_mm(&self, a: &DAffine3, b: &DAffine3) -> f64 {
+        let (low, high) = self.start;
+        let apart = Motion::between(a, b, a.transform_point3((low + high) / 2.0));
+        apart.slide.length() + apart.angle.abs() * low.distance(high) / 4.0
+    }
+
+    /// Free travel of each kind of motion from a place.
+    fn ranges(&mut self, group: &Moved<'_>, kinds: &[Kind]) -> Vec<(f64, Option<[usize; 2]>)> {
+        let mut ranges = Vec::new();
+        for kind in kinds {
+            if self.clock.is_over() {
+                self.out_of_time = true;
+                return Vec::new();
+            }
+            ranges.push(self.range(group, kind));
+        }
+        ranges
+    }
+
     /// Places reached by one leg at which another motion opens, with the gain of that motion in mm.
     fn openings(&mut self, place: &Place) -> Vec<(f64, Place)> {
         let group = Moved {
@@ -183,42 +225,47 @@ impl Search<'_> {
             by: place.by,
         };
         let kinds = self.kinds(&group);
-        let mut ranges = Vec::new();
-        for kind in &kinds {
-            if self.clock.is_over() {
-                self.out_of_time = true;
-                return Vec::new();
-            }
-            ranges.push(self.range(&group, kind));
-        }
+        let ranges = self.ranges(&group, &kinds);
         let mut found = Vec::new();
         for (p, &(reach, _)) in kinds.iter().zip(&ranges) {
             if reach <= PLAY_MM {
                 continue;
             }
+            let mut openings = Vec::new();
             for (q, &(range, pair)) in kinds.iter().zip(&ranges) {
+                if pair.is_some() {
+                    openings.extend(self.opening(&group, p, [0.0, reach], q, range));
+                }
+                if range >= self.opening_mm {
+                    openings.extend(self.reopening(&group, p, reach, q));
+                }
                 if self.clock.is_over() {
                     self.out_of_time = true;
                     return found;
                 }
-                let mut reached = Vec::new();
-                if pair.is_some() {
-                    reached.extend(self.opening(&group, p, [0.0, reach], q, range));
-                }
-                if range >= self.opening_mm {
-                    reached.extend(self.reopening(&group, p, reach, q));
-                }
-                for opening in reached {
-                    found.extend(self.reached(place, p, &opening));
-                }
             }
             for q in self.at_the_end(&group, p, reach, &kinds) {
-                if let Some(opening) = self.opening(&group, p, [0.0, reach], &q, 0.0) {
-                    found.extend(self.reached(place, p, &opening));
-                }
+                openings.extend(self.opening(&group, p, [0.0, reach], &q, 0.0));
+            }
+            for opening in openings {
+                found.extend(self.reached(place, p, &opening));
             }
         }
         found
+    }
+
+    /// Slides between the planes that are near at the end of leg `p`, in directions of none of `kinds`: beyond a bend of a channel.
+    fn at_the_end(&self, group: &Moved<'_>, p: &Kind, reach: f64, kinds: &[Kind]) -> Vec<Kind> {
+        let end = self.group(p.over(reach).at(1.0) * group.by);
+        let mut found = between_planes(self.assembly, &end, self.others, self.opening_mm);
+        found.retain(|d| {
+            let is_along = |k: &Kind| matches!(k, Kind::Slide(known) if same_direction(*known, *d));
+            !kinds.iter().any(is_along)
+        });
+        found.truncate(BETWEEN);
+        (found.into_iter())
+            .flat_map(|d| [Kind::Slide(d), Kind::Slide(-d)])
+            .collect()
     }
 
     /// The place at an opening along leg `p`, where it is new, with its gain.
@@ -230,24 +277,11 @@ impl Search<'_> {
         }
         self.seen.push(by);
         let mut legs = place.legs.clone();
-        legs.push(leg);
+        if opening.at > 0.0 {
+            legs.push(leg);
+        }
         legs.extend(opening.shift.map(Motion::slide));
         Some((opening.gain, Place { by, legs }))
-    }
-
-    /// Slides between the planes that are near at the end of leg `p`, in directions that no kind has: beyond a bend of a channel.
-    fn at_the_end(&self, group: &Moved<'_>, p: &Kind, reach: f64, kinds: &[Kind]) -> Vec<Kind> {
-        let end = self.group(p.over(reach).at(1.0) * group.by);
-        let mut found = between_planes(self.assembly, &end, self.others, self.opening_mm);
-        found.retain(|d| {
-            !kinds
-                .iter()
-                .any(|k| matches!(k, Kind::Slide(known) if same_direction(*known, *d)))
-        });
-        found.truncate(BETWEEN);
-        (found.into_iter())
-            .flat_map(|d| [Kind::Slide(d), Kind::Slide(-d)])
-            .collect()
     }
 
     fn kinds(&self, group: &Moved<'_>) -> Vec<Kind> {
@@ -348,8 +382,7 @@ impl Search<'_> {
     }
 
     fn is_new(&self, by: DAffine3) -> bool {
-        let center = self.assembly.bounds_of(self.parts, DAffine3::IDENTITY);
-        let center = (center.0 + center.1) / 2.0;
+        let center = (self.start.0 + self.start.1) / 2.0;
         self.seen.iter().all(|known| {
             let apart = Motion::between(known, &by, known.transform_point3(center));
             apart.slide.length() > SAME_POSE.0 || apart.angle.abs() > SAME_POSE.1

@@ -209,14 +209,11 @@ fn split(
     Err((blocked, timed_out))
 }
 
-/// The one of two blocks that lacks less.
+/// The one of two blocks that is proved, or else lacks less.
 fn nearer(known: Option<Blocked>, new: Blocked) -> Blocked {
+    let rank = |one: &Blocked| (one.proof.is_none(), one.overlap_mm.unwrap_or(f64::INFINITY));
     match known {
-        Some(known)
-            if known.overlap_mm.unwrap_or(f64::INFINITY) <= new.overlap_mm.unwrap_or(f64::INFINITY) =>
-        {
-            known
-        }
+        Some(known) if rank(&known) <= rank(&new) => known,
         _ => new,
     }
 }

@@ -12,6 +12,8 @@ const LEVELS: usize = 3;
 const MOST_CELLS: usize = 8_000;
 /// Most points that are made deeper by an ascent.
 const BALLS: usize = 8;
+/// Pieces in which the segments of such points are looked at.
+const PIECES: u32 = 8;
 /// Most points on axes.
 const AXIAL: usize = 32;
 /// Last step of such an ascent, mm.
@@ -106,12 +108,12 @@ pub(crate) fn skeleton(body: &Body) -> Skeleton {
         }
     }
     for (p, depth) in balls {
-        found.add(p, depth, cell);
+        found.add(body, p, depth, cell);
     }
     for p in between_circles(body.surface().shape()) {
         let depth = -body.distance_once(p);
         if depth > 0.0 {
-            let id = found.add(p, depth, cell);
+            let id = found.add(body, p, depth, cell);
             found.axial.push(id);
         }
     }
@@ -123,24 +125,40 @@ pub(crate) fn skeleton(body: &Body) -> Skeleton {
 }
 
 impl Skeleton {
-    /// Adds a point, with segments to those nearby.
-    fn add(&mut self, p: DVec3, depth: f64, cell: f64) -> u32 {
+    /// Adds a point, with segments to those nearby, whose depth is looked at along their length.
+    fn add(&mut self, body: &Body, p: DVec3, depth: f64, cell: f64) -> u32 {
         let id = self.points.len() as u32;
         self.points.push(p);
         self.depths.push(depth);
         for j in 0..id {
-            if self.points[j as usize].distance(p) < 2.0 * cell {
-                self.join(id, j);
+            let (q, end) = (self.points[j as usize], self.depths[j as usize]);
+            if q.distance(p) >= 2.0 * cell {
+                continue;
             }
+            let inside = |i: u32| -body.distance_once(p.lerp(q, f64::from(i) / f64::from(PIECES)));
+            let depths: Vec<f64> = (std::iter::once(depth))
+                .chain((1..PIECES).map(inside))
+                .chain([end])
+                .collect();
+            let least = depths
+                .windows(2)
+                .map(|w| w[0] + w[1])
+                .fold(f64::INFINITY, f64::min);
+            self.connect([id, j], (least - p.distance(q) / f64::from(PIECES)) / 2.0);
         }
         id
     }
 
+    /// A segment whose depth is known from that of its ends alone.
     fn join(&mut self, i: u32, j: u32) {
         let [a, b] = [i, j].map(|k| k as usize);
         let depth = (self.depths[a] + self.depths[b] - self.points[a].distance(self.points[b])) / 2.0;
+        self.connect([i, j], depth);
+    }
+
+    fn connect(&mut self, ends: [u32; 2], depth: f64) {
         if depth > LEAST_MM {
-            self.segments.push(Segment { ends: [i, j], depth });
+            self.segments.push(Segment { ends, depth });
         }
     }
 }

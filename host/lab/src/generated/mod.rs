@@ -12,7 +12,7 @@ use glam::{DAffine3, DVec2, DVec3, dvec2, dvec3};
 use mortise_brep::{LoadOptions, Part, load_step, write};
 use tempfile::NamedTempFile;
 
-use self::solids::Bore;
+pub(crate) use self::solids::Bore;
 use crate::LabError;
 use crate::guided;
 use crate::step_text::StepText;

@@ -5,6 +5,7 @@ mod assembly_file;
 mod channels;
 mod checked;
 mod extraction;
+mod interlocked;
 mod large;
 mod played;
 mod sequences;
@@ -18,9 +19,8 @@ const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to thei
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     sequences::own(out)?;
-    if !plan.quick {
-        extraction::own(plan, out)?;
-    }
+    extraction::own(plan, out)?;
+    interlocked::measure(plan, out)?;
     large::measure(plan, out)?;
     played::own(out)?;
     let Some(cad) = corpus::folder() else {

@@ -29,8 +29,8 @@ const OTHERS: [&str; 4] = [
     "real/dn_flex_assembly.step",
     "05_motor/motor_flat.step",
 ];
-/// Time of a search, and the longest one, s.
-const SEARCH_S: u64 = 240;
+/// Time of a search, and the longest one of those whose order is known, s. The time is that of the command line without options.
+const SEARCH_S: u64 = 60;
 const LONGEST_S: f64 = 60.0;
 
 /// Steps of an assembly: parts that are put together, and those they are put onto.
@@ -144,10 +144,11 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
             let [a, b] = blocked.pair.map(|part| assembly.name(part));
             format!("{a} does not leave {b}")
         });
+        let stuck = stuck.collect::<Vec<_>>().join(", ");
         let verdict = match (whole, found.timed_out) {
             (true, _) => "comes apart".to_owned(),
-            (false, true) => "time ran out".to_owned(),
-            (false, false) => stuck.collect::<Vec<_>>().join(", "),
+            (false, true) => format!("time ran out; {stuck}"),
+            (false, false) => stuck,
         };
         out(Row::noted(
             format!("{file}, {} parts: verdict", assembly.count()),
