@@ -6,10 +6,9 @@ use mortise_mating::Tolerances;
 
 use crate::assembly::{Assembly, Moved};
 use crate::clearance::Placed;
+pub use crate::line::Line;
+use crate::line::{same_direction, same_line};
 
-/// Angle within which two directions, and distance within which two axes, are the same.
-const SAME_RAD: f64 = 1e-3;
-const SAME_MM: f64 = 5e-2;
 /// Most directions (each used both ways) and axes of a group.
 const MOST_DIRECTIONS: usize = 8;
 const MOST_AXES: usize = 8;
@@ -17,15 +16,6 @@ const MOST_AXES: usize = 8;
 const LEAST_SHARE: f64 = 2e-3;
 /// Sine between opposing normals in a contact.
 const FACING: f64 = 1e-2;
-
-/// A line about which a part could turn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
-    /// Point on it, mm, in the assembly's frame.
-    pub point: DVec3,
-    /// Unit direction.
-    pub direction: DVec3,
-}
 
 /// Candidates of motion of a group, most important first.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -218,15 +208,4 @@ fn add<T: Copy>(list: &mut Vec<(f64, T)>, weight: f64, item: T, same: fn(T, T) -
         Some((sum, _)) => *sum += weight,
         None => list.push((weight, item)),
     }
-}
-
-/// Whether two directions are parallel, either way.
-pub(crate) fn same_direction(a: DVec3, b: DVec3) -> bool {
-    a.cross(b).length() < SAME_RAD
-}
-
-/// Whether two axes are one line.
-pub(crate) fn same_line(a: Line, b: Line) -> bool {
-    same_direction(a.direction, b.direction)
-        && (b.point - a.point).reject_from_normalized(a.direction).length() < SAME_MM
 }

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 use glam::{DAffine3, DQuat, DVec3};
 
 use crate::assembly::Assembly;
-use crate::directions::{Line, candidates};
+use crate::directions::candidates;
+use crate::line::Line;
 use crate::mobility::leaving_mm;
 use crate::motion::Motion;
 use crate::race::Clock;

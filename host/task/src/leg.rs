@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::directions::{Line, same_line};
+use crate::line::{Line, same_line};
 use crate::motion::Motion;
 
 /// A motion of unit travel, in either sense.

@@ -28,6 +28,7 @@ mod hints;
 pub mod insertion;
 mod kept;
 mod leg;
+mod line;
 mod linking;
 pub mod mobility;
 mod motion;

@@ -15,7 +15,8 @@ use serde::Serialize;
 
 use crate::assembly::{Assembly, Moved, SEARCH_STEP_MM};
 use crate::cone::{Cone, cone};
-use crate::directions::{Line, candidates, contact_normals, same_direction};
+use crate::directions::{candidates, contact_normals};
+use crate::line::{Line, same_direction};
 use crate::motion::Motion;
 
 /// Step by which a freedom is confirmed, mm of travel of the farthest point.

@@ -6,8 +6,9 @@ use glam::{DAffine3, DVec3};
 
 use crate::assembly::{Assembly, Moved, SEARCH_STEP_MM};
 use crate::cone::cone;
-use crate::directions::{Line, between_planes, candidates, contact_normals, same_direction, same_line};
+use crate::directions::{between_planes, candidates, contact_normals};
 use crate::leg::{Kind, Missed, Opening};
+use crate::line::{Line, same_direction, same_line};
 use crate::mobility::{PLAY_MM, leaving_mm};
 use crate::motion::Motion;
 use crate::race::Clock;

@@ -14,7 +14,8 @@ use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Clearance, Moved};
 use crate::blocking::Blocking;
-use crate::directions::{candidates, same_direction};
+use crate::directions::candidates;
+use crate::line::same_direction;
 use crate::motion::Motion;
 use crate::removal::{Blocked, Budget, Path, Removal, remove};
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use mortise_brep::{Curve, Shape, Surface};
 
 use crate::body::Body;
-use crate::directions::{Line, same_line};
+use crate::line::{Line, same_line};
 
 /// Cells along the diagonal of the box at first, most divisions, and most cells of a level.
 const FIRST: f64 = 16.0;

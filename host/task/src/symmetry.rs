@@ -1,7 +1,7 @@
 //! Turns that change nothing, so that a search need not make them.
 
 use crate::assembly::{Assembly, Moved};
-use crate::directions::Line;
+use crate::line::Line;
 use crate::motion::Motion;
 
 /// Turns, radians, after which a part that is made of surfaces of revolution about an axis still lies in itself, and by how much a sample may leave it, mm.

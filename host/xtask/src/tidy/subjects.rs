@@ -257,6 +257,7 @@ const VERBS: &[&str] = &[
     "Silence",
     "Simplify",
     "Skip",
+    "Slide",
     "Smooth",
     "Solve",
     "Sort",
