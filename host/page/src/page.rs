@@ -42,11 +42,7 @@ pub fn page(title: &str, assembly: &Assembly, found: &Sequence, felt: &[String])
         verdict(&report)
     );
     for stuck in &report.stuck {
-        let _ = write!(page, "<p class=\"stuck\">{}", escaped(&stuck.words()));
-        if let Some(proof) = &stuck.proof {
-            let _ = write!(page, "; {}", escaped(proof));
-        }
-        page.push_str("</p>\n");
+        let _ = writeln!(page, "<p class=\"stuck\">{}</p>", escaped(&stuck.words()));
     }
     pictures(&mut page, assembly, found, &report);
     table(&mut page, &report);

@@ -89,6 +89,30 @@ fn what_stays_together_is_said() {
     assert!(pictures(&page).is_empty());
 }
 
+/// Without a proof it is said that the search may have overlooked a way.
+#[test]
+fn what_was_only_searched_is_not_called_certain() {
+    let (assembly, mut found) = taken_apart("app/samples/pair_d18.75_clear1.00.step", "block");
+    for (overlap_mm, words) in [
+        (Some(0.25), "by 250.0 µm at the widest place found"),
+        (None, "meets"),
+    ] {
+        found.stuck = vec![(
+            vec![0, 1],
+            mortise_task::removal::Blocked {
+                pair: [1, 0],
+                overlap_mm,
+                proof: None,
+            },
+        )];
+        let page = page("pair", &assembly, &found, &[]);
+        assert!(
+            page.contains("stay together, as far as was searched:") && page.contains(words),
+            "{page}"
+        );
+    }
+}
+
 /// A page of very many steps says that it has no pictures.
 #[test]
 fn a_long_page_has_no_pictures() {

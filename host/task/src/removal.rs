@@ -4,7 +4,7 @@
 //! have few legs, and walks in contact (`explore`), which find narrow passages that no slide or turn about one axis of a surface leads through. Before it walks, the second looks for
 //! a proof that there is no way (`proof`).
 //!
-//! A leg is a slide along a candidate direction or a turn about a candidate axis ([`crate::directions`]). A way of several legs is searched from opening to
+//! A leg is a slide along a candidate direction, or along the line that two planes nearby have in common, or a turn about a candidate axis ([`crate::directions`]). A way of several legs is searched from opening to
 //! opening: while the group makes one leg, another motion that was blocked becomes possible. Where it does is found by testing the group *displaced* by that
 //! motion past its present range, at places along the leg: the depth of its overlap there changes by no more than the group travels, so the next place
 //! worth testing is as far as the overlap is deep. Of a stretch that is clear the displacement grows until the stretch is narrowest, and the leg ends

@@ -135,11 +135,19 @@ pub struct StuckReport<'a> {
 }
 
 impl StuckReport<'_> {
-    /// What stays together, in words, and what holds it.
+    /// What stays together, in words, what holds it, and why that is certain, or that it is not.
     pub fn words(&self) -> String {
-        let [a, b] = self.pair;
-        let lacks = (self.overlap_um).map_or(String::new(), |um| format!(" by {um:.1} µm at the least"));
-        format!("{} stay together: {a} meets {b}{lacks}", self.parts.join(", "))
+        let ([a, b], parts) = (self.pair, self.parts.join(", "));
+        match (&self.proof, self.overlap_um) {
+            (Some(proof), um) => {
+                let least = um.map_or(String::new(), |um| format!(" by {um:.1} µm at the least"));
+                format!("{parts} stay together: {a} meets {b}{least}; {proof}")
+            }
+            (None, Some(um)) => format!(
+                "{parts} stay together, as far as was searched: {a} meets {b}, by {um:.1} µm at the widest place found"
+            ),
+            (None, None) => format!("{parts} stay together, as far as was searched: {a} meets {b}"),
+        }
     }
 }
 
