@@ -356,7 +356,7 @@ impl Assembly {
     }
 
     /// Pairs of a moved group and `others` whose boxes are within `within`.
-    fn pairs<'a>(
+    pub(crate) fn pairs<'a>(
         &'a self,
         group: &Moved<'a>,
         others: &'a [usize],

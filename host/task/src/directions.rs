@@ -1,6 +1,6 @@
 //! Directions and axes along which a part could move: those of its own surfaces and of the surfaces beside it, and the normals of its contacts.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use mortise_brep::{Frame, Surface};
 use mortise_mating::Tolerances;
 
@@ -31,22 +31,15 @@ pub struct Candidates {
 pub fn contact_normals(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> Vec<DVec3> {
     let near = Tolerances::default().linear_mm;
     let mut normals = Vec::new();
-    for &a in group.parts {
-        let (al, ah) = assembly.bounds(a, group.by);
-        for &b in others {
-            let (bl, bh) = assembly.bounds(b, glam::DAffine3::IDENTITY);
-            if (al - bh).max(bl - ah).max_element() > near {
-                continue;
-            }
-            let error = [a, b].map(|p| assembly.body(p).surface().surface_error_mm());
-            let within = near + error[0] + error[1];
-            let (pa, pb) = (
-                assembly.placed(a, group.by),
-                assembly.placed(b, glam::DAffine3::IDENTITY),
-            );
-            touching(pa, pb, within, &mut |n| normals.push(-n));
-            touching(pb, pa, within, &mut |n| normals.push(n));
-        }
+    for (a, b) in assembly.pairs(group, others, near) {
+        let error = [a, b].map(|p| assembly.body(p).surface().surface_error_mm());
+        let within = near + error[0] + error[1];
+        let (pa, pb) = (
+            assembly.placed(a, group.by),
+            assembly.placed(b, DAffine3::IDENTITY),
+        );
+        touching(pa, pb, within, &mut |n| normals.push(-n));
+        touching(pb, pa, within, &mut |n| normals.push(n));
     }
     normals
 }
@@ -81,7 +74,7 @@ pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> C
         .parts
         .iter()
         .map(|&p| (p, group.by))
-        .chain(others.iter().map(|&p| (p, glam::DAffine3::IDENTITY)));
+        .chain(others.iter().map(|&p| (p, DAffine3::IDENTITY)));
     for (part, by) in all {
         let (l, h) = assembly.bounds(part, by);
         if (low - h).max(l - high).max_element() > near {
@@ -142,7 +135,7 @@ pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> C
     }
 }
 
-/// Smallest sine between two planes that have a direction in common.
+/// Smallest sine of the angle between two planes whose common line counts.
 const CROSSING: f64 = 5e-2;
 
 /// Directions in which a moved group slides between the planes that face it within `within` mm: each lies in two of these planes. Those with most samples nearby first.
@@ -155,21 +148,14 @@ pub(crate) fn between_planes(
     within: f64,
 ) -> Vec<DVec3> {
     let mut normals: Vec<(f64, DVec3)> = Vec::new();
-    for &a in group.parts {
-        let (al, ah) = assembly.bounds(a, group.by);
-        for &b in others {
-            let (bl, bh) = assembly.bounds(b, glam::DAffine3::IDENTITY);
-            if (al - bh).max(bl - ah).max_element() > within {
-                continue;
-            }
-            let (pa, pb) = (
-                assembly.placed(a, group.by),
-                assembly.placed(b, glam::DAffine3::IDENTITY),
-            );
-            let mut each = |n| add(&mut normals, 1.0, n, same_direction);
-            facing_planes(pa, pb, within, &mut each);
-            facing_planes(pb, pa, within, &mut each);
-        }
+    for (a, b) in assembly.pairs(group, others, within) {
+        let (pa, pb) = (
+            assembly.placed(a, group.by),
+            assembly.placed(b, DAffine3::IDENTITY),
+        );
+        let mut each = |n| add(&mut normals, 1.0, n, same_direction);
+        facing_planes(pa, pb, within, &mut each);
+        facing_planes(pb, pa, within, &mut each);
     }
     let mut directions: Vec<(f64, DVec3)> = Vec::new();
     for (i, (m, a)) in normals.iter().enumerate() {

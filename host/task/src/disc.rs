@@ -10,8 +10,8 @@ use glam::DVec3;
 const DISC_RIM: usize = 24;
 const DISC_SHARE: f64 = 0.1;
 
-/// Least depth of a disc's points below the surface, at least, mm; 0 where it is not inside, less deep than `counts_mm`, or not known after as many divisions as `pieces`. The depth changes by no more than its point moves: of the pieces of
-/// the disc the one that may be least deep is divided, until it is known well enough.
+/// A lower bound of the depth of a disc's points below the surface, mm; 0 where it is not inside, or less deep than `counts_mm`. The depth changes by no more than its point moves: of the pieces
+/// of the disc the one that may be least deep is divided, until it is known to [`DISC_SHARE`] or after as many divisions as `divisions`.
 ///
 /// Cost: of a disc as deep as its rim is wide some tens of distances, of a disc 30 µm inside a rim of radius 3 mm some ten thousand.
 pub(crate) fn disc_depth(
@@ -20,7 +20,7 @@ pub(crate) fn disc_depth(
     normal: DVec3,
     radius: f64,
     counts_mm: f64,
-    pieces: usize,
+    divisions: usize,
 ) -> f64 {
     let x = normal.any_orthonormal_vector();
     let y = normal.cross(x);
@@ -32,21 +32,20 @@ pub(crate) fn disc_depth(
     let rim = (0..DISC_RIM).map(|i| depth(radius, TAU * i as f64 / DISC_RIM as f64));
     let mut least = rim.fold(f64::INFINITY, f64::min);
     let mut open = BinaryHeap::from([Piece::new([0.0, radius], [0.0, TAU], &depth)]);
-    if least < counts_mm {
-        return 0.0;
-    }
-    for _ in 0..pieces {
-        let Some(piece) = open.pop() else { break };
+    for _ in 0..divisions {
+        let Some(piece) = open.peek() else { break };
         least = least.min(piece.depth);
         if least < counts_mm {
             return 0.0;
         }
         if least - piece.bound() <= DISC_SHARE * least {
-            return piece.bound();
+            break;
         }
-        open.extend(piece.halves(&depth));
+        if let Some(piece) = open.pop() {
+            open.extend(piece.halves(&depth));
+        }
     }
-    0.0
+    open.peek().map_or(0.0, |piece| piece.bound().max(0.0))
 }
 
 /// A piece of a disc: between two radii and two angles.

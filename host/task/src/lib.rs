@@ -43,7 +43,6 @@ mod search;
 pub mod sequence;
 mod shorten;
 mod skeleton;
-mod symmetry;
 mod walk;
 mod way;
 mod work;

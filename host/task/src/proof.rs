@@ -216,13 +216,11 @@ impl<'a> Side<'a> {
             if !tree.places.iter().any(beyond) {
                 continue;
             }
-            let axial = |i: &usize| self.skeleton.axial.contains(&(*i as u32));
-            points.sort_by(|i, j| {
-                let deeper = self.skeleton.depths[*j].total_cmp(&self.skeleton.depths[*i]);
-                axial(j).cmp(&axial(i)).then(deeper)
-            });
-            let count = points.iter().filter(|i| axial(i)).count();
-            points.truncate(count + TRIED);
+            // Ascending: those on axes are the last ones.
+            let axial = points.split_off(points.partition_point(|&i| i < self.skeleton.axial));
+            points.sort_by(|&i, &j| self.skeleton.depths[j].total_cmp(&self.skeleton.depths[i]));
+            points.truncate(TRIED);
+            points.extend(axial);
             ends.extend(
                 points
                     .iter()
@@ -258,14 +256,11 @@ impl<'a> Side<'a> {
             radius_mm: depth,
             lacks_mm: depth - opening,
         };
-        if ball.lacks_mm >= LEAST_MM {
-            return Some(ball);
-        }
         let radius_mm = opening + LEAST_MM;
-        let pieces = if self.skeleton.axial.contains(&(at as u32)) {
-            PIECES_AXIAL
-        } else {
+        let pieces = if at < self.skeleton.axial {
             PIECES
+        } else {
+            PIECES_AXIAL
         };
         let center = self.skeleton.points[at];
         let depth = disc_depth(&|p| self.distance(p), center, normal, radius_mm, LEAST_MM, pieces);
@@ -274,7 +269,12 @@ impl<'a> Side<'a> {
             radius_mm,
             lacks_mm: depth - curve.deviation,
         };
-        (disc.lacks_mm >= LEAST_MM).then_some(disc)
+        let end = if ball.lacks_mm >= disc.lacks_mm {
+            ball
+        } else {
+            disc
+        };
+        (end.lacks_mm >= LEAST_MM).then_some(end)
     }
 
     /// A proof by a ball of this part inside the other.

@@ -12,7 +12,6 @@ use crate::line::{Line, same_direction, same_line};
 use crate::mobility::{PLAY_MM, leaving_mm};
 use crate::motion::Motion;
 use crate::race::Clock;
-use crate::symmetry::turns_into_itself;
 use crate::way::Path;
 
 /// Displacement past its present range by which a blocked motion is tested, as a share of the group's size and its limits, mm of travel: a larger one overlooks
@@ -403,5 +402,56 @@ impl Search<'_> {
                 },
                 |c| c.pair,
             )
+    }
+}
+
+/// Whether a turn about `axis` leaves a group as it is: all its faces are surfaces of revolution about it.
+fn turns_into_itself(assembly: &Assembly, group: &Moved<'_>, axis: &Line) -> bool {
+    let turn = Motion::turn(axis.point, axis.direction, 1.0);
+    group.parts.iter().all(|&part| {
+        let placed = assembly.placed(part, group.by);
+        let carried = placed.body.carried_along(&turn, &placed.pose);
+        let faces = placed.body.surface().shape().faces.len();
+        carried.iter().take(faces).all(|carried| *carried)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// A peg turns into itself about its own axis alone, wherever it is; a block about none, nor the two together.
+    #[test]
+    fn a_turned_part_turns_into_itself_about_its_axis() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../app/samples/pair_d18.75_clear1.00.step");
+        let assembly = Assembly::new(mortise_brep::load_step(file).unwrap()).unwrap();
+        let (peg, block) = (assembly.part("peg").unwrap(), assembly.part("block").unwrap());
+        let by = Motion::turn(DVec3::new(3.0, -5.0, 1.0), DVec3::X, 0.6).at(1.0);
+        let placed = by * assembly.placement(peg);
+        let frames = assembly.body(peg).surface().shape().faces.iter();
+        let frame = (frames.filter_map(|face| match face.surface {
+            mortise_brep::Surface::Cylinder { frame, .. } => Some(frame),
+            _ => None,
+        }))
+        .next()
+        .unwrap();
+        let axis = Line {
+            point: placed.transform_point3(frame.origin),
+            direction: placed.transform_vector3(frame.z),
+        };
+        let beside = Line {
+            point: axis.point + 0.1 * axis.direction.any_orthonormal_vector(),
+            ..axis
+        };
+        let across = Line {
+            direction: axis.direction.any_orthonormal_vector(),
+            ..axis
+        };
+        let turns = |parts: &[usize], axis: &Line| turns_into_itself(&assembly, &Moved { parts, by }, axis);
+        assert!(turns(&[peg], &axis));
+        assert!(!turns(&[peg], &beside) && !turns(&[peg], &across));
+        assert!(!turns(&[block], &axis) && !turns(&[peg, block], &axis));
     }
 }

@@ -28,8 +28,8 @@ pub(crate) struct Skeleton {
     /// Depth of each point below the surface, mm.
     pub depths: Vec<f64>,
     pub segments: Vec<Segment>,
-    /// Points on the axes of circles, halfway between two of them: middles of heads, collars and discs.
-    pub axial: Vec<u32>,
+    /// Index of the first point on the axis of circles, halfway between two of them: middles of heads, collars and discs, to the end of the points.
+    pub axial: usize,
 }
 
 /// A segment inside the material.
@@ -110,11 +110,11 @@ pub(crate) fn skeleton(body: &Body) -> Skeleton {
     for (p, depth) in balls {
         found.add(body, p, depth, cell);
     }
+    found.axial = found.points.len();
     for p in between_circles(body.surface().shape()) {
         let depth = -body.distance_once(p);
         if depth > 0.0 {
-            let id = found.add(body, p, depth, cell);
-            found.axial.push(id);
+            found.add(body, p, depth, cell);
         }
     }
     // Order of a map is not repeatable.
@@ -126,7 +126,7 @@ pub(crate) fn skeleton(body: &Body) -> Skeleton {
 
 impl Skeleton {
     /// Adds a point, with segments to those nearby, whose depth is looked at along their length.
-    fn add(&mut self, body: &Body, p: DVec3, depth: f64, cell: f64) -> u32 {
+    fn add(&mut self, body: &Body, p: DVec3, depth: f64, cell: f64) {
         let id = self.points.len() as u32;
         self.points.push(p);
         self.depths.push(depth);
@@ -146,7 +146,6 @@ impl Skeleton {
                 .fold(f64::INFINITY, f64::min);
             self.connect([id, j], (least - p.distance(q) / f64::from(PIECES)) / 2.0);
         }
-        id
     }
 
     /// A segment whose depth is known from that of its ends alone.

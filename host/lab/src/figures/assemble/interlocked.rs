@@ -17,9 +17,9 @@ use crate::step_text::StepText;
 /// Seeds in the full and in the quick form.
 const SEEDS: u64 = 10;
 const SEEDS_QUICK: u64 = 3;
-/// By how much more a part is wide than the opening before it, mm: least and most.
+/// Excess of a part's width over that of the opening which holds it, mm: least and most.
 const HELD_MM: [f64; 2] = [0.02, 0.05];
-/// By how much the loosened opening is wider.
+/// Play that is added in the loosened form, mm.
 const LOOSENED_MM: f64 = 0.06;
 /// Share of the overlap that must be proved, and what may be missing beside that, mm: the least depth that counts, and how far a polygon is from the opening's rim.
 const PROVED: f64 = 0.9;
@@ -38,7 +38,7 @@ pub(super) enum Kind {
     Chained,
 }
 
-/// One of them.
+/// The assembly of a kind and a seed.
 pub(super) struct Interlocked {
     kind: Kind,
     random: fastrand::Rng,
@@ -61,7 +61,7 @@ impl Interlocked {
         low + (high - low) * self.random.f64()
     }
 
-    /// The assembly.
+    /// Its STEP file.
     pub fn file(&mut self) -> Result<NamedTempFile, LabError> {
         let mut text = StepText::new();
         match self.kind {
@@ -77,20 +77,7 @@ impl Interlocked {
         let shank = hole - self.between(0.02, 0.3);
         let thick = self.between(1.5, 4.0);
         let count = self.random.usize(2..=4);
-        let half = 3.0 * hole;
-        let outline = [
-            dvec2(-half, -half),
-            dvec2(half, -half),
-            dvec2(half, half),
-            dvec2(-half, half),
-        ];
-        let bore = Bore {
-            faces: (0, Some(1)),
-            mouth: DVec3::ZERO,
-            depth: DVec3::Z * thick,
-            radius: hole,
-        };
-        let plate = text.prism(&outline, [0.0, thick], &[bore]);
+        let plate = plate(text, 3.0 * hole, hole, [0.0, thick]);
         for i in 0..count {
             let at = DVec3::Z * (thick * i as f64);
             text.part(&format!("plate_{i}"), plate, DAffine3::from_translation(at));
@@ -143,22 +130,7 @@ impl Interlocked {
     fn chained(&mut self, text: &mut StepText) {
         let bore = self.between(4.0, 8.0);
         let [wide, thick] = [0; 2].map(|_| bore * self.between(0.3, 0.5));
-        let mut frame = |bore: f64| {
-            let half = bore + wide;
-            let outline = [
-                dvec2(-half, -half),
-                dvec2(half, -half),
-                dvec2(half, half),
-                dvec2(-half, half),
-            ];
-            let hole = Bore {
-                faces: (0, Some(1)),
-                mouth: DVec3::NEG_Z * (thick / 2.0),
-                depth: DVec3::Z * thick,
-                radius: bore,
-            };
-            text.prism(&outline, [-thick / 2.0, thick / 2.0], &[hole])
-        };
+        let mut frame = |bore: f64| plate(text, bore + wide, bore, [-thick / 2.0, thick / 2.0]);
         // The bars of the outer frames have room side by side in the middle one.
         let (outer, middle) = (frame(bore), frame(2.0 * bore));
         let apart = DVec3::X * (2.0 * bore + wide / 2.0);
@@ -168,7 +140,7 @@ impl Interlocked {
         text.part("right", outer, DAffine3::from_translation(2.0 * apart));
     }
 
-    /// Parts of which one holds the other, by their names.
+    /// Whether one of the two parts holds the other, by their names.
     fn holds(&self, pair: [&str; 2]) -> bool {
         match self.kind {
             Kind::Riveted => pair.contains(&"rivet"),
@@ -181,6 +153,23 @@ impl Interlocked {
     fn stay(&self, count: usize) -> usize {
         if self.kind == Kind::Caged { 2 } else { count }
     }
+}
+
+/// A square plate of half the side `half` between two heights, with a round bore in its middle, mm.
+fn plate(text: &mut StepText, half: f64, bore: f64, [low, high]: [f64; 2]) -> u64 {
+    let outline = [
+        dvec2(-half, -half),
+        dvec2(half, -half),
+        dvec2(half, half),
+        dvec2(-half, half),
+    ];
+    let bore = Bore {
+        faces: (0, Some(1)),
+        mouth: DVec3::Z * low,
+        depth: DVec3::Z * (high - low),
+        radius: bore,
+    };
+    text.prism(&outline, [low, high], &[bore])
 }
 
 /// Whether what a search found is true: the parts stay, with the pair and a proof that they overlap by nearly as much as they do on the straight way out.
