@@ -13,7 +13,6 @@
 //! Cost: of each part and direction some distance queries for each part ahead of it, and sweeps against all of these where it leaves; by all cores.
 
 use std::collections::{HashMap, HashSet};
-use std::time::Instant;
 
 use glam::{DAffine3, DVec3};
 use petgraph::algo::tarjan_scc;
@@ -21,6 +20,7 @@ use petgraph::graph::{DiGraph, NodeIndex};
 use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Moved, SEARCH_STEP_MM};
+use crate::deadline::Deadline;
 use crate::mobility::leaving_mm;
 use crate::motion::Motion;
 
@@ -72,7 +72,7 @@ impl<'a> Blocking<'a> {
 
     /// The smallest group of `set` that leaves it along one of the directions, of equally many parts the one of least volume; `None` also where `until` is
     /// over first.
-    pub fn leaving(&mut self, set: &[usize], until: Instant) -> Option<Leaving> {
+    pub fn leaving(&mut self, set: &[usize], until: &Deadline) -> Option<Leaving> {
         match self.single(set, until) {
             Ok(None) => self.group(set, until).ok().flatten(),
             Ok(found) => found,
@@ -86,7 +86,7 @@ impl<'a> Blocking<'a> {
     }
 
     /// The smallest part of `set` that leaves it.
-    fn single(&mut self, set: &[usize], until: Instant) -> Result<Option<Leaving>, Over> {
+    fn single(&mut self, set: &[usize], until: &Deadline) -> Result<Option<Leaving>, Over> {
         if set.len() < 2 {
             return Ok(None);
         }
@@ -117,7 +117,7 @@ impl<'a> Blocking<'a> {
         &mut self,
         set: &[usize],
         (part, line, against): (usize, usize, bool),
-        until: Instant,
+        until: &Deadline,
     ) -> Result<Option<usize>, Over> {
         let (assembly, along) = (self.assembly, self.directions[line]);
         let pair = |other: usize| if against { [other, part] } else { [part, other] };
@@ -155,7 +155,7 @@ impl<'a> Blocking<'a> {
     }
 
     /// Makes relations of pairs along a line known.
-    fn sweep(&mut self, line: usize, pairs: &[[usize; 2]], until: Instant) -> Result<(), Over> {
+    fn sweep(&mut self, line: usize, pairs: &[[usize; 2]], until: &Deadline) -> Result<(), Over> {
         let (assembly, along) = (self.assembly, self.directions[line]);
         let mut alike: HashMap<Alike, Vec<[usize; 2]>> = HashMap::new();
         for &[i, j] in pairs {
@@ -172,7 +172,7 @@ impl<'a> Blocking<'a> {
         let meet: Option<Vec<bool>> = (alike.par_iter().with_max_len(1))
             .map(|(_, same)| {
                 let [i, j] = same[0];
-                (Instant::now() < until).then(|| meets(assembly, i, j, along))
+                (!until.is_over()).then(|| meets(assembly, i, j, along))
             })
             .collect();
         for ((one, same), meets) in alike.into_iter().zip(meet.ok_or(Over)?) {
@@ -185,7 +185,7 @@ impl<'a> Blocking<'a> {
     }
 
     /// The smallest group of `set` that leaves it, by whole graphs.
-    fn group(&mut self, set: &[usize], until: Instant) -> Result<Option<Leaving>, Over> {
+    fn group(&mut self, set: &[usize], until: &Deadline) -> Result<Option<Leaving>, Over> {
         let assembly = self.assembly;
         let mut found: Vec<Leaving> = Vec::new();
         for line in 0..self.directions.len() {

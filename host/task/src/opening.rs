@@ -243,7 +243,7 @@ impl Search<'_> {
         let mut most = (0.0, missed.pair);
         let mut travel = 0.0;
         while travel < missed.most {
-            if self.clock.budget.until.elapsed() > HELD_TIME {
+            if self.clock.budget.until.is_over_by(HELD_TIME) {
                 return (DEEP_MM, missed.pair);
             }
             let moved = Moved {

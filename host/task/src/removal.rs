@@ -14,7 +14,6 @@
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
 
 use glam::{DAffine3, DVec3};
 
@@ -106,10 +105,9 @@ fn proved(
     budget: &Budget,
     found_at: &AtomicU64,
 ) -> Option<(f64, [usize; 2], Proof)> {
-    let now = Instant::now();
-    let until = now + budget.until.saturating_duration_since(now).mul_f64(PROOF_SHARE);
+    let until = budget.until.share(PROOF_SHARE);
     // A way that is found meanwhile is an answer, too: there is no proof then.
-    let over = || Instant::now() >= until || found_at.load(Ordering::Relaxed) != u64::MAX;
+    let over = || until.is_over() || found_at.load(Ordering::Relaxed) != u64::MAX;
     // Where boxes have most in common, one part is most likely within the other.
     let common = |a: usize, b: usize| {
         let [(al, ah), (bl, bh)] = [a, b].map(|part| assembly.bounds(part, DAffine3::IDENTITY));

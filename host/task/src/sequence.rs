@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Clearance, Moved};
 use crate::blocking::Blocking;
+use crate::deadline::Deadline;
 use crate::directions::candidates;
 use crate::line::same_direction;
 use crate::motion::Motion;
@@ -86,16 +87,16 @@ pub fn directions(assembly: &Assembly, set: &[usize]) -> Vec<DVec3> {
     sums.into_iter().take(LINES).map(|(_, d)| d).collect()
 }
 
-/// Takes the parts of `set` apart within `time`.
-pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequence {
-    let start = Instant::now();
+/// Takes the parts of `set` apart before `end`.
+pub fn disassemble(assembly: &Assembly, set: &[usize], end: impl Into<Deadline>) -> Sequence {
+    let (start, end) = (Instant::now(), end.into());
     // A tenth is left for measuring.
-    let until = start + time.mul_f64(0.9);
+    let until = end.share(0.9);
     let mut found = Sequence {
         steps: Vec::new(),
         stuck: Vec::new(),
         timed_out: false,
-        time,
+        time: Duration::ZERO,
     };
     let mut blocking = Blocking::new(assembly, directions(assembly, set));
     let mut open = vec![set.to_vec()];
@@ -103,11 +104,11 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequen
         if set.len() < 2 {
             continue;
         }
-        if Instant::now() >= until {
+        if until.is_over() {
             found.timed_out = true;
             break;
         }
-        match split(assembly, &mut blocking, &set, until) {
+        match split(assembly, &mut blocking, &set, &until) {
             Ok(step) => {
                 open.push(step.onto.clone());
                 open.push(step.group.clone());
@@ -119,9 +120,8 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequen
             }
         }
     }
-    let end = start + time;
     let measured: Vec<Option<Option<Clearance>>> = (found.steps.par_iter().with_max_len(1))
-        .map(|step| measure(assembly, step, end))
+        .map(|step| measure(assembly, step, &end))
         .collect();
     for (step, least) in found.steps.iter_mut().zip(measured) {
         step.measured = least.is_some();
@@ -136,7 +136,7 @@ fn split(
     assembly: &Assembly,
     blocking: &mut Blocking<'_>,
     set: &[usize],
-    until: Instant,
+    until: &Deadline,
 ) -> Result<Step, (Blocked, bool)> {
     let rest = |group: &[usize]| {
         set.iter()
@@ -174,14 +174,13 @@ fn split(
     let mut timed_out = false;
     let count = groups.len();
     for (i, group) in groups.into_iter().enumerate() {
-        let left = until.saturating_duration_since(Instant::now());
-        if left.is_zero() {
+        if until.is_over() {
             timed_out = true;
             break;
         }
         let onto = rest(&group);
         let budget = Budget {
-            until: Instant::now() + left.div_f64((count - i).min(3) as f64),
+            until: until.share(1.0 / (count - i).min(3) as f64),
             legs: 12,
             seed: 0,
         };
@@ -239,7 +238,7 @@ fn pairs(assembly: &Assembly, set: &[usize]) -> Vec<Vec<usize>> {
 /// Least distance on a step's way in, with the descent between samples at its narrowest place; the outer `None` when it is not measured by `until`.
 ///
 /// Cost: a sweep against each part whose box is as near to the swept box of the group as the least distance found.
-pub fn measure(assembly: &Assembly, step: &Step, until: Instant) -> Option<Option<Clearance>> {
+pub fn measure(assembly: &Assembly, step: &Step, until: &Deadline) -> Option<Option<Clearance>> {
     let (mut by, path) = step.path.reversed();
     let mut least: Option<Clearance> = None;
     let mut at = by;
@@ -249,7 +248,7 @@ pub fn measure(assembly: &Assembly, step: &Step, until: Instant) -> Option<Optio
             by,
         };
         for (bound, part) in nearest_first(assembly, &moved, &step.onto, leg) {
-            if Instant::now() >= until {
+            if until.is_over() {
                 return None;
             }
             let within = least.map_or(FAR_MM, |l| l.gap.distance_mm);

@@ -1,9 +1,10 @@
 //! Ways out, and the bounds of a search for one.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use glam::DAffine3;
 
+use crate::deadline::Deadline;
 use crate::motion::Motion;
 use crate::proof::Proof;
 
@@ -60,10 +61,10 @@ pub enum Removal {
 }
 
 /// Bounds of a search.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Budget {
     /// When it ends.
-    pub until: Instant,
+    pub until: Deadline,
     /// Most legs of a way; 1: straight ways only.
     pub legs: usize,
     /// Seed of the random numbers of walks.
@@ -74,13 +75,13 @@ impl Budget {
     /// Ends after this long; up to twelve legs.
     pub fn lasting(time: Duration) -> Self {
         Self {
-            until: Instant::now() + time,
+            until: time.into(),
             legs: 12,
             seed: 0,
         }
     }
 
     pub(crate) fn is_over(&self) -> bool {
-        Instant::now() >= self.until
+        self.until.is_over()
     }
 }

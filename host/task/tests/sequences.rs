@@ -2,12 +2,14 @@
 
 mod support;
 
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_task::removal::{Budget, Path, Removal, remove};
 use mortise_task::report::{self, Sense};
-use mortise_task::{Assembly, Moved, sequence};
+use mortise_task::{Assembly, Deadline, Moved, sequence};
 use serde_json::Value;
 
 /// Removes part 1 from part 0 and checks the way by its waypoints, the form in which it is published.
@@ -135,7 +137,7 @@ fn a_rod_with_flat_heads_stays_in_its_cylinder() {
 fn without_time_nothing_is_claimed() {
     let assembly = support::own("mating/tests/data/two_pin_exact.step");
     let budget = Budget {
-        until: Instant::now(),
+        until: Duration::ZERO.into(),
         legs: 12,
         seed: 0,
     };
@@ -144,6 +146,10 @@ fn without_time_nothing_is_claimed() {
         Removal::TimedOut(_)
     ));
     let found = sequence::disassemble(&assembly, &[0, 1], Duration::ZERO);
+    assert!(found.timed_out && found.steps.is_empty());
+    // The same where the caller no longer wants it.
+    let stopped = Deadline::from(Duration::from_secs(60)).or_stopped(Arc::new(AtomicBool::new(true)));
+    let found = sequence::disassemble(&assembly, &[0, 1], stopped);
     assert!(found.timed_out && found.steps.is_empty());
     assert_eq!(
         report::sequence(&assembly, &found, Sense::Assembly).verdict,

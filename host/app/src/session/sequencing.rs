@@ -6,6 +6,7 @@ use glam::DAffine3;
 
 use super::document::Document;
 use super::sequence::{Sequence, are_same};
+use super::threads::Cancel;
 
 /// What a search found.
 pub struct SequenceFound {
@@ -29,6 +30,8 @@ pub struct Sequencing {
     searches: u64,
     /// Start of the search under way.
     since: Option<Instant>,
+    /// Ends the thread of the search under way.
+    cancel: Cancel,
     /// Document of the search.
     generation: Option<u64>,
     found: Option<Result<Sequence, String>>,
@@ -70,12 +73,13 @@ impl Sequencing {
         });
     }
 
-    /// Begins a search in the document of this number; returns the number of the search.
-    pub(super) fn begin(&mut self, generation: u64) -> u64 {
-        self.searches += 1;
+    /// Begins a search in the document of this number, and ends one under way; returns the number of the search, and what ends it.
+    pub(super) fn begin(&mut self, generation: u64) -> (u64, Cancel) {
+        self.cancel();
+        self.cancel = Cancel::default();
         (self.since, self.generation) = (Some(Instant::now()), Some(generation));
         (self.found, self.shown) = (None, None);
-        self.searches
+        (self.searches, self.cancel.clone())
     }
 
     /// Notes where the window has put the parts.
@@ -86,8 +90,9 @@ impl Sequencing {
         });
     }
 
-    /// Forgets the search under way: its thread ends by itself.
+    /// Ends the search under way.
     pub(super) fn cancel(&mut self) {
+        self.cancel.set();
         self.since = None;
         self.searches += 1;
     }

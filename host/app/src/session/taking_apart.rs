@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use mortise_brep::CadModel;
-use mortise_task::{Assembly, sequence};
+use mortise_task::{Assembly, Deadline, sequence};
 
 use super::ask::write;
 use super::outbox::Update;
 use super::sequence::Sequence;
 use super::sequencing::SequenceFound;
 use super::state::Session;
-use super::threads::spawn;
+use super::threads::{Cancel, spawn};
 
 /// Longest search.
 const LONGEST: Duration = Duration::from_secs(60);
@@ -23,12 +23,13 @@ impl Session {
     /// Starts the search, which must be possible.
     pub(super) fn find_sequence(&mut self) {
         let Some(document) = &self.document else { return };
-        let id = self.sequencing.begin(document.generation);
+        let (id, cancel) = self.sequencing.begin(document.generation);
         let (model, outbox) = (Arc::clone(&document.model), self.outbox.clone());
         let title = document.title.clone();
         spawn("mortise-sequence", move || {
-            let result = search(&title, &model);
-            outbox.send(Update::Sequence(SequenceFound { id, result }));
+            if let Some(result) = search(&title, &model, &cancel) {
+                outbox.send(Update::Sequence(SequenceFound { id, result }));
+            }
         });
     }
 
@@ -66,10 +67,32 @@ impl Session {
     }
 }
 
-/// The steps of a model, with their report. Cost: seconds, at most [`LONGEST`] and some.
-fn search(title: &str, model: &CadModel) -> Result<Sequence, String> {
-    let assembly = Assembly::new(model.clone()).map_err(|error| error.to_string())?;
+/// The steps of a model, with their report, or why there are none; `None` when it was cancelled. Cost: seconds, at most [`LONGEST`] and some; after a cancel
+/// the contacts of the parts are still found, and a search ends within a sweep of one pair of them.
+fn search(title: &str, model: &CadModel, cancel: &Cancel) -> Option<Result<Sequence, String>> {
+    let assembly = match Assembly::new(model.clone()) {
+        Ok(assembly) => assembly,
+        Err(error) => return Some(Err(error.to_string())),
+    };
     let all: Vec<usize> = (0..assembly.count()).collect();
-    let found = sequence::disassemble(&assembly, &all, LONGEST);
-    Ok(Sequence::new(title, &assembly, &found))
+    let until = Deadline::from(LONGEST).or_stopped(cancel.flag());
+    let found = sequence::disassemble(&assembly, &all, until);
+    (!cancel.is_set()).then(|| Ok(Sequence::new(title, &assembly, &found)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::session::document::Document;
+
+    #[test]
+    fn a_cancelled_search_gives_nothing() {
+        let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
+        let cancel = Cancel::default();
+        assert!(search("sample", &document.model, &cancel).is_some());
+        cancel.set();
+        assert_eq!(search("sample", &document.model, &cancel), None);
+    }
 }
