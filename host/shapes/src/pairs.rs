@@ -70,6 +70,11 @@ impl Designed {
         pair(&self.moving, &self.fixed, self.moved)
     }
 
+    /// Designed pose of the moving part, in the fixed part's frame.
+    pub fn pose(&self) -> DAffine3 {
+        self.moved[1] * self.moved[0].inverse()
+    }
+
     /// Largest displacement of a mating point from where alternative `index` puts it, free motions apart, mm; `pose` is the moving part's
     /// in the fixed part's frame.
     pub fn error(&self, pose: &DAffine3, index: usize) -> f64 {

@@ -15,7 +15,9 @@ use crate::clearance::{
 };
 use crate::error::TaskError;
 use crate::motion::Motion;
+use crate::profile::{Profile, profiles};
 use crate::skeleton::{Skeleton, skeleton};
+use crate::stated::Stated;
 use crate::work::work;
 
 /// Overlap accepted beyond the one that the file's placements already have, mm: twice the default distance of a contact
@@ -32,9 +34,13 @@ pub struct Assembly {
     pub model: CadModel,
     /// Contacts of the parts as placed in the file.
     pub contacts: Vec<Contact>,
+    /// What a catalogue states of its parts.
+    pub stated: Stated,
     bodies: Vec<Option<Arc<Body>>>,
     /// Of each shape its inside as a graph, made when first needed.
     skeletons: Vec<OnceLock<Skeleton>>,
+    /// Of each shape its profiles, found when first needed.
+    profiles: Vec<OnceLock<Vec<Profile>>>,
     merged: Vec<Vec<MergedSurface>>,
     /// Overlap of each pair as placed, mm: allowed of it on every path.
     pressed_mm: Vec<f64>,
@@ -94,6 +100,8 @@ impl Assembly {
         let mut assembly = Self {
             model,
             contacts,
+            stated: Stated::default(),
+            profiles: bodies.iter().map(|_| OnceLock::new()).collect(),
             skeletons: bodies.iter().map(|_| OnceLock::new()).collect(),
             bodies,
             merged,
@@ -159,6 +167,17 @@ impl Assembly {
         }
     }
 
+    /// A part with those that it is permanently connected to, and all others.
+    pub fn with_joined(&self, part: usize) -> (Vec<usize>, Vec<usize>) {
+        let all: Vec<usize> = (0..self.count()).collect();
+        let mut units = self.stated.units(&all).into_iter();
+        let unit = units
+            .find(|unit| unit.contains(&part))
+            .unwrap_or_else(|| vec![part]);
+        let others = all.into_iter().filter(|part| !unit.contains(part)).collect();
+        (unit, others)
+    }
+
     /// The prepared shape of a part.
     ///
     /// # Panics
@@ -173,6 +192,12 @@ impl Assembly {
     /// The inside of a part's shape as a graph, in its frame.
     pub(crate) fn skeleton(&self, part: usize) -> &Skeleton {
         self.skeletons[self.model.parts[part].shape].get_or_init(|| skeleton(self.body(part)))
+    }
+
+    /// Profiles of a part's shape, in its frame.
+    pub fn profiles(&self, part: usize) -> &[Profile] {
+        self.profiles[self.model.parts[part].shape]
+            .get_or_init(|| profiles(self.body(part).surface().shape()))
     }
 
     /// Merged surfaces of a part's shape, in its frame: the indices of [`Contact::surfaces`].

@@ -56,10 +56,13 @@ struct Over;
 impl<'a> Blocking<'a> {
     /// Relations along `directions`, both ways of each.
     pub fn new(assembly: &'a Assembly, directions: Vec<DVec3>) -> Self {
+        // What does not come apart is in each other's way, along every direction.
+        let joined = assembly.stated.permanent().flat_map(|[a, b]| [[a, b], [b, a]]);
+        let known = joined.flat_map(|[a, b]| (0..directions.len()).map(move |line| ((line, a, b), true)));
         Self {
             assembly,
+            known: known.collect(),
             directions,
-            known: HashMap::new(),
             alike: HashMap::new(),
             blockers: HashMap::new(),
         }
@@ -190,9 +193,10 @@ impl<'a> Blocking<'a> {
         let mut found: Vec<Leaving> = Vec::new();
         for line in 0..self.directions.len() {
             let along = self.directions[line];
+            let meets_by_now = |i, j| self.known.get(&(line, i, j)) == Some(&true);
             let pairs: Vec<[usize; 2]> = (set.par_iter())
                 .flat_map_iter(|&i| set.iter().map(move |&j| [i, j]))
-                .filter(|&[i, j]| i != j && ahead(assembly, i, j, along))
+                .filter(|&[i, j]| i != j && (meets_by_now(i, j) || ahead(assembly, i, j, along)))
                 .collect();
             let unknown = |&[i, j]: &[usize; 2]| !self.known.contains_key(&(line, i, j));
             let open: Vec<[usize; 2]> = pairs.iter().copied().filter(unknown).collect();

@@ -19,6 +19,12 @@ pub enum TaskError {
         /// Number of parts.
         count: usize,
     },
+    /// A catalogue of an assembly.
+    #[error("catalogue: {what}")]
+    Catalogue {
+        /// What is wrong.
+        what: String,
+    },
     /// A file with fewer than two parts.
     #[error("one part is not an assembly; give a file with at least two parts")]
     OnePart,

@@ -4,7 +4,8 @@
 //! 1. [`Assembly`] prepares a [`CadModel`](mortise_brep::CadModel): samples of each part under a tree ([`Body`]), and contacts.
 //! 2. Queries on exact surfaces: the least distance of placed parts ([`gap`], [`refined`]), how far a motion goes ([`free_share`]), and the least distance over a
 //!    motion ([`least_over`]).
-//! 3. [`mod@graph`]: the connection graph; [`ports`]: places for connections.
+//! 3. [`ports`]: places for connections, with [`profile`]s of any form; [`mod@graph`]: the connection graph, from contacts and [`fits`]; [`taxonomy`]: kinds of both;
+//!    [`catalogue`]: what the file cannot say.
 //! 4. [`mobility`]: freedoms by contact cones ([`mod@cone`]), confirmed over finite steps.
 //! 5. [`removal`]: ways out of one or several legs, and proofs that there is none ([`Proof`]); [`blocking`] and [`sequence`]: whole sequences with subassemblies;
 //!    [`insertion`]: their steps that a hand can do.
@@ -16,6 +17,7 @@
 mod assembly;
 pub mod blocking;
 mod body;
+pub mod catalogue;
 mod clearance;
 pub mod cone;
 mod deadline;
@@ -23,6 +25,7 @@ pub mod directions;
 mod disc;
 mod error;
 mod explore;
+pub mod fits;
 pub mod graph;
 mod helix;
 mod hints;
@@ -36,6 +39,7 @@ mod motion;
 mod opening;
 mod passage;
 pub mod ports;
+pub mod profile;
 mod proof;
 mod race;
 pub mod removal;
@@ -44,6 +48,9 @@ mod search;
 pub mod sequence;
 mod shorten;
 mod skeleton;
+mod stated;
+pub mod taxonomy;
+mod threads;
 mod walk;
 mod way;
 mod work;

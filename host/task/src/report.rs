@@ -6,10 +6,11 @@ use glam::{DAffine3, DQuat, DVec3};
 use serde::Serialize;
 
 use crate::assembly::{Assembly, Moved};
-use crate::graph::{Connection, graph};
+use crate::graph::graph;
 use crate::mobility::{Freedoms, Reach, freedoms};
 use crate::removal::{Blocked, Path};
 use crate::sequence::{Sequence, Step};
+use crate::taxonomy::Connection;
 
 /// Largest turn between two waypoints, radians: a point 50 mm from the axis then leaves its arc by 2 µm.
 const WAYPOINT_RAD: f64 = 0.0175;
@@ -162,6 +163,8 @@ pub struct SequenceReport<'a> {
     pub steps: Vec<StepReport<'a>>,
     /// What stays together.
     pub stuck: Vec<StuckReport<'a>>,
+    /// Parts that are one, by permanent connections of the catalogue.
+    pub joined: Vec<Vec<&'a str>>,
     /// Pairs that overlap as placed in the file, µm.
     pub pressed: Vec<PressedReport<'a>>,
     /// Time taken, s.
@@ -211,9 +214,18 @@ pub fn sequence<'a>(assembly: &'a Assembly, found: &Sequence, sense: Sense) -> S
             .iter()
             .map(|(parts, blocked)| stuck(assembly, parts, blocked))
             .collect(),
+        joined: joined(assembly),
         pressed: pressed(assembly),
         time_s: found.time.as_secs_f64(),
     }
+}
+
+fn joined(assembly: &Assembly) -> Vec<Vec<&str>> {
+    let all: Vec<usize> = (0..assembly.count()).collect();
+    let units = assembly.stated.units(&all).into_iter();
+    (units.filter(|unit| unit.len() > 1))
+        .map(|unit| names(assembly, &unit))
+        .collect()
 }
 
 fn names<'a>(assembly: &'a Assembly, parts: &[usize]) -> Vec<&'a str> {
@@ -313,25 +325,20 @@ pub struct RotationReport {
     pub range_deg: [f64; 2],
 }
 
-/// Freedoms of some parts, each against all others in place.
+/// Freedoms of some parts, each with those that it is permanently connected to, against all others in place.
 pub fn mobility<'a>(assembly: &'a Assembly, parts: &[usize]) -> Vec<PartMobility<'a>> {
     parts
         .iter()
         .map(|&part| {
-            let group = [part];
-            let others: Vec<usize> = (0..assembly.count()).filter(|&p| p != part).collect();
-            let found = freedoms(
-                assembly,
-                &Moved {
-                    parts: &group,
-                    by: DAffine3::IDENTITY,
-                },
-                &others,
-                &[],
-            );
-            part_mobility(assembly, part, &found)
+            let (unit, others) = assembly.with_joined(part);
+            part_mobility(assembly, part, &freedoms_of(assembly, &unit, &others))
         })
         .collect()
+}
+
+fn freedoms_of(assembly: &Assembly, parts: &[usize], others: &[usize]) -> Freedoms {
+    let by = DAffine3::IDENTITY;
+    freedoms(assembly, &Moved { parts, by }, others, &[])
 }
 
 fn part_mobility<'a>(assembly: &'a Assembly, part: usize, found: &Freedoms) -> PartMobility<'a> {
@@ -375,9 +382,40 @@ pub struct ConnectionReport<'a> {
     pub fits: Vec<FitReport<'a>>,
 }
 
-/// A shaft in a bore.
+impl ConnectionReport<'_> {
+    /// Its kinds in words, strongest first.
+    pub fn words(&self) -> String {
+        let words: Vec<&str> = self.kinds.iter().map(|kind| kind.kind().words.as_str()).collect();
+        words.join(", ")
+    }
+}
+
+/// A connection, and what it leaves free.
+#[derive(Clone, Debug, Serialize)]
+pub struct FreeConnection<'a> {
+    /// The connection.
+    #[serde(flatten)]
+    pub connection: ConnectionReport<'a>,
+    /// Freedoms of the first part with the second alone in its way.
+    pub freedoms: PartMobility<'a>,
+}
+
+/// The connection graph with what each connection leaves free. Cost: the freedoms of one part against the other, for each.
+pub fn free_connections(assembly: &Assembly) -> Vec<FreeConnection<'_>> {
+    let parts: Vec<[usize; 2]> = graph(assembly).edge_weights().map(|edge| edge.parts).collect();
+    (connections(assembly).into_iter().zip(parts))
+        .map(|(connection, [first, second])| FreeConnection {
+            connection,
+            freedoms: part_mobility(assembly, first, &freedoms_of(assembly, &[first], &[second])),
+        })
+        .collect()
+}
+
+/// A shaft in a bore, or a profile in a hole.
 #[derive(Clone, Debug, Serialize)]
 pub struct FitReport<'a> {
+    /// Whether it is round; else diameters are those of circles about the profile, and the clearance is twice that of the outlines.
+    pub round: bool,
     /// Part with the shaft.
     pub shaft: &'a str,
     /// Part with the bore.
@@ -419,6 +457,7 @@ pub fn connections(assembly: &Assembly) -> Vec<ConnectionReport<'_>> {
                     diameter_mm: 2.0 * fit.radius_mm,
                     clearance_um: 2e3 * fit.clearance_mm,
                     length_mm: fit.length_mm,
+                    round: fit.is_round,
                 })
                 .collect(),
         })

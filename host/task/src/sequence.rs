@@ -101,7 +101,7 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], end: impl Into<Deadline>)
     let mut blocking = Blocking::new(assembly, directions(assembly, set));
     let mut open = vec![set.to_vec()];
     while let Some(set) = open.pop() {
-        if set.len() < 2 {
+        if assembly.stated.units(&set).len() < 2 {
             continue;
         }
         if until.is_over() {
@@ -162,13 +162,14 @@ fn split(
             measured: false,
         });
     }
-    let mut groups: Vec<Vec<usize>> = set.iter().map(|&p| vec![p]).collect();
+    let mut groups = assembly.stated.units(set);
     groups.sort_by(|a, b| volume(assembly, a).total_cmp(&volume(assembly, b)));
-    if set.len() == 2 {
+    if groups.len() == 2 {
         // Either part is the other's obstacle: one search is enough.
         groups.truncate(1);
-    } else if set.len() > 3 {
-        groups.extend(pairs(assembly, set));
+    } else if groups.len() > 3 {
+        let pairs = pairs(assembly, &groups);
+        groups.extend(pairs);
     }
     let mut worst: Option<Blocked> = None;
     let mut timed_out = false;
@@ -225,10 +226,17 @@ fn volume(assembly: &Assembly, group: &[usize]) -> f64 {
         .sum()
 }
 
-/// Pairs of touching parts of `set`.
-fn pairs(assembly: &Assembly, set: &[usize]) -> Vec<Vec<usize>> {
-    let mut pairs: Vec<Vec<usize>> = (assembly.contacts.iter().map(|c| c.parts.to_vec()))
-        .filter(|pair| pair.iter().all(|p| set.contains(p)))
+/// Pairs of touching units.
+fn pairs(assembly: &Assembly, units: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    let unit = |part: usize| units.iter().find(|unit| unit.contains(&part));
+    let mut pairs: Vec<Vec<usize>> = (assembly.contacts.iter())
+        .filter_map(|contact| {
+            let [a, b] = contact.parts.map(unit);
+            let (a, b) = (a?, b?);
+            let mut both = [&a[..], &b[..]].concat();
+            both.sort_unstable();
+            (a != b).then_some(both)
+        })
         .collect();
     pairs.sort();
     pairs.dedup();

@@ -1,31 +1,43 @@
 //! `mortise mobility`, `disassemble`, `assemble` and `features`: how the parts of an assembly are connected, move, and come apart.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use anyhow::Context as _;
 use mortise_brep::LoadOptions;
 use mortise_output::{Existing, Output, lines};
 use mortise_rig::RigSpec;
 use mortise_task::removal::{Budget, Removal, remove};
 use mortise_task::report::{self, Sense, SequenceReport};
 use mortise_task::sequence::{self, Sequence, Step};
-use mortise_task::{Assembly, ports};
+use mortise_task::{Assembly, catalogue, ports};
 use serde::Serialize;
 
 use super::played::{self, Played};
 use super::reading::Reading;
+use super::text_file;
+
+/// The assembly of a command.
+#[derive(Debug, clap::Args)]
+struct Source {
+    /// STEP file of an assembly, parts in their final places
+    file: PathBuf,
+    /// File (TOML) of what a STEP file cannot say: threads, and connections such as welded
+    #[arg(long, value_name = "CATALOGUE")]
+    catalogue: Option<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
+}
 
 /// Arguments of `mobility`.
 #[derive(Debug, clap::Args)]
 pub struct MobilityArgs {
-    /// STEP file of an assembly
-    file: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// One part instead of all
     #[arg(long, value_name = "PART")]
     part: Option<String>,
-    #[command(flatten)]
-    reading: Reading,
     /// One JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -34,10 +46,8 @@ pub struct MobilityArgs {
 /// Arguments of `features`.
 #[derive(Debug, clap::Args)]
 pub struct FeaturesArgs {
-    /// STEP file of an assembly
-    file: PathBuf,
     #[command(flatten)]
-    reading: Reading,
+    source: Source,
     /// One JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -46,13 +56,11 @@ pub struct FeaturesArgs {
 /// Arguments of a search.
 #[derive(Debug, clap::Args)]
 pub struct SearchArgs {
-    /// STEP file of an assembly, parts in their final places
-    file: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// Limit on the time of the search, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = super::units::seconds, allow_negative_numbers = true)]
     time: u64,
-    #[command(flatten)]
-    reading: Reading,
     /// One JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -87,18 +95,28 @@ pub struct DisassembleArgs {
 /// Largest distance between a spline and the simpler surface recognised in it, mm: that of `contacts`.
 const FIT_MM: f64 = 1e-3;
 
-fn read(file: &Path, reading: &Reading) -> anyhow::Result<Assembly> {
-    reading.apply();
-    let options = LoadOptions {
-        recognise_mm: FIT_MM,
-        ..LoadOptions::default()
-    };
-    Ok(Assembly::new(mortise_brep::load_step_with(file, &options)?)?)
+impl Source {
+    fn read(&self) -> anyhow::Result<Assembly> {
+        self.reading.apply();
+        let options = LoadOptions {
+            recognise_mm: FIT_MM,
+            ..LoadOptions::default()
+        };
+        let text = (self.catalogue.as_ref())
+            .map(|catalogue| text_file::read(catalogue, "a catalogue (TOML)"))
+            .transpose()?;
+        let mut assembly = Assembly::new(mortise_brep::load_step_with(&self.file, &options)?)?;
+        if let (Some(text), Some(file)) = (text, &self.catalogue) {
+            let stated = catalogue::read(&text, &assembly);
+            assembly.stated = stated.with_context(|| file.display().to_string())?;
+        }
+        Ok(assembly)
+    }
 }
 
 /// Runs `mobility`.
 pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
-    let assembly = read(&args.file, &args.reading)?;
+    let assembly = args.source.read()?;
     let parts = match &args.part {
         Some(name) => vec![assembly.part(name)?],
         None => (0..assembly.count()).collect(),
@@ -149,10 +167,10 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
 pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
     // A search of a minute is not for a file that cannot be written.
     let existing = Existing::from_force(args.force);
-    let output = |path: &PathBuf| Output::new(path, existing, &[&args.search.file]);
+    let output = |path: &PathBuf| Output::new(path, existing, &[&args.search.source.file]);
     let output = args.report.as_ref().map(output).transpose()?;
     let client = args.play.as_ref().map(played::connect).transpose()?;
-    let assembly = read(&args.search.file, &args.search.reading)?;
+    let assembly = args.search.source.read()?;
     let all: Vec<usize> = (0..assembly.count()).collect();
     let found = sequence::disassemble(&assembly, &all, Duration::from_secs(args.search.time));
     let report = report::sequence(&assembly, &found, Sense::Assembly);
@@ -165,7 +183,7 @@ pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
         .map(|client| played::play(&assembly, &found, client, json))
         .transpose()?;
     if let Some(output) = output {
-        let name = args.search.file.file_stem();
+        let name = args.search.source.file.file_stem();
         let title = name.map_or("assembly".into(), |name| name.to_string_lossy());
         let felt = played.as_ref().map_or(&[][..], Played::felt);
         output.write(mortise_page::page(&title, &assembly, &found, felt).as_bytes())?;
@@ -182,7 +200,7 @@ pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
 /// Runs `disassemble`.
 pub fn disassemble(args: &DisassembleArgs) -> anyhow::Result<ExitCode> {
     let search = &args.search;
-    let assembly = read(&search.file, &search.reading)?;
+    let assembly = search.source.read()?;
     let time = Duration::from_secs(search.time);
     let found = match &args.part {
         Some(name) => take_out(&assembly, assembly.part(name)?, time),
@@ -194,11 +212,10 @@ pub fn disassemble(args: &DisassembleArgs) -> anyhow::Result<ExitCode> {
     )
 }
 
-/// Removal of one part from all others in place.
+/// Removal of one part, with those that it is permanently connected to, from all others in place.
 fn take_out(assembly: &Assembly, part: usize, time: Duration) -> Sequence {
     let start = Instant::now();
-    let group = vec![part];
-    let onto: Vec<usize> = (0..assembly.count()).filter(|&p| p != part).collect();
+    let (group, onto) = assembly.with_joined(part);
     let mut found = Sequence {
         steps: Vec::new(),
         stuck: Vec::new(),
@@ -245,6 +262,9 @@ fn print_sequence(report: &SequenceReport<'_>, json: bool) -> anyhow::Result<Exi
     for step in &report.steps {
         lines::text(&format!("{}. {}", step.step, step.words()))?;
     }
+    for joined in &report.joined {
+        lines::text(&format!("{} are one", joined.join(", ")))?;
+    }
     for stuck in &report.stuck {
         lines::text(&stuck.words())?;
     }
@@ -258,11 +278,10 @@ fn print_sequence(report: &SequenceReport<'_>, json: bool) -> anyhow::Result<Exi
 
 /// Runs `features`.
 pub fn features(args: &FeaturesArgs) -> anyhow::Result<ExitCode> {
-    let assembly = read(&args.file, &args.reading)?;
+    let assembly = args.source.read()?;
     let found: Vec<_> = (0..assembly.count())
         .map(|p| (assembly.name(p), ports::ports(&assembly, p)))
         .collect();
-    let connections = report::connections(&assembly);
     if args.json {
         #[derive(Serialize)]
         struct Part<'a> {
@@ -272,13 +291,13 @@ pub fn features(args: &FeaturesArgs) -> anyhow::Result<ExitCode> {
         #[derive(Serialize)]
         struct Report<'a> {
             parts: Vec<Part<'a>>,
-            connections: Vec<report::ConnectionReport<'a>>,
+            connections: Vec<report::FreeConnection<'a>>,
             warnings: &'a [String],
         }
         let parts = found.iter().map(|(part, ports)| Part { part, ports }).collect();
         lines::json(&Report {
             parts,
-            connections,
+            connections: report::free_connections(&assembly),
             warnings: &assembly.model.warnings,
         })?;
         return Ok(ExitCode::SUCCESS);
@@ -289,9 +308,8 @@ pub fn features(args: &FeaturesArgs) -> anyhow::Result<ExitCode> {
             lines::text(&format!("  {port}"))?;
         }
     }
-    for c in &connections {
-        let kinds: Vec<String> = c.kinds.iter().map(|k| format!("{k:?}").to_lowercase()).collect();
-        lines::text(&format!("{} – {}: {}", c.a, c.b, kinds.join(", ")))?;
+    for c in &report::connections(&assembly) {
+        lines::text(&format!("{} – {}: {}", c.a, c.b, c.words()))?;
     }
     Ok(ExitCode::SUCCESS)
 }

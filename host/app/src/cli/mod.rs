@@ -22,6 +22,7 @@ mod replay;
 mod rig;
 mod section;
 mod task;
+mod text_file;
 mod units;
 mod window;
 

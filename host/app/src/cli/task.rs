@@ -1,6 +1,5 @@
 //! `mortise task`: instructions in plain words, carried out on an assembly one after another.
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -10,9 +9,6 @@ use mortise_output::{Existing, Output, lines};
 use mortise_words::{Outcome, Session, Turn, Verb};
 
 use super::reading::Reading;
-
-/// Largest script, bytes.
-const LARGEST_SCRIPT: u64 = 1 << 20;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -84,17 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 fn read_script(path: &Path) -> anyhow::Result<Vec<String>> {
-    let shown = path.display();
-    if path.is_dir() {
-        bail!("{shown}: is a folder; name a text file");
-    }
-    let file = std::fs::File::open(path).with_context(|| format!("{shown}: cannot be read"))?;
-    let mut text = String::new();
-    let read = file.take(LARGEST_SCRIPT + 1).read_to_string(&mut text);
-    read.with_context(|| format!("{shown}: is not a text; give one instruction a line"))?;
-    if text.len() as u64 > LARGEST_SCRIPT {
-        bail!("{shown}: larger than {LARGEST_SCRIPT} bytes; split it");
-    }
+    let text = super::text_file::read(path, "one instruction a line")?;
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
     Ok(lines
         .filter(|line| !line.is_empty() && !line.starts_with('#'))

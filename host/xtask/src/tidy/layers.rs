@@ -75,7 +75,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("firmware", &["mortise-haptics", "mortise-protocol"]),
     ("protocol", &[]),
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
-    ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
+    (
+        "host/task",
+        &["mortise-bake", "mortise-brep", "mortise-mating", "mortise-shapes"],
+    ),
     ("host/energy", &["mortise-bake", "mortise-brep"]),
     ("host/shapes", &[]),
     ("host/flash", &["mortise-protocol"]),
