@@ -1,7 +1,7 @@
 //! The insertions of an assembly, played one after another on a rig by a simulated hand: what each is felt like, and where it caught.
 //!
 //! Every part is felt where the steps before have left the others. Parts that are not yet put on are placed far away; the next one is placed at the start of its
-//! way ([`ToDevice::Place`]), and the hand takes it at its centre of mass. The hand comes slightly off its way, trembles, and pulls through a spring, so that
+//! way ([`ToDevice::Place`]), and the hand takes it at its centre of mass. Of a group, which moves as one, a scene is baked in which it is one part. The hand comes slightly off its way, trembles, and pulls through a spring, so that
 //! contact and guidance, and not the script, bring the part in. Constraints that the designed place satisfies are pinned as they are recognised.
 
 use glam::{DAffine3, DQuat, DVec3};
@@ -15,6 +15,7 @@ use mortise_rig::Client;
 use mortise_task::insertion::Insertion;
 
 use crate::error::ScenarioError;
+use crate::group::GroupScene;
 use crate::hand::{REACH_TICKS, REST_TICKS, TICK_HZ};
 pub use crate::hand_way::Manner;
 use crate::hand_way::{Way, between, rotation, scripts};
@@ -114,7 +115,7 @@ impl Moment {
 /// not go in stays where it is, and the next step begins with it there.
 ///
 /// # Errors
-/// `NeedsSimulatedHand`, `Rig`, `Fault`; `Input` when a part is not in the scene, for it has no surface.
+/// `NeedsSimulatedHand`, `Rig`, `Fault`, `Bake` of a group; `Input` when a part is not in the scene, for it has no surface.
 pub fn play_insertions(
     client: &Client,
     scene: &AssemblyScene<'_>,
@@ -128,11 +129,40 @@ pub fn play_insertions(
             scenario: "the steps of an assembly".into(),
         });
     }
-    let mut bench = Bench::new(client, scene)?;
+    let mut rests: Vec<DAffine3> = scene.model.parts.iter().map(|part| part.placement).collect();
+    let mut bench: Option<Bench<'_>> = None;
     for insertion in insertions {
+        if !insertion.with.is_empty() {
+            // The board gets the group's scene instead.
+            bench = None;
+            report(play_group(client, scene, insertion, &rests, manner)?);
+            continue;
+        }
+        let bench = match &mut bench {
+            Some(bench) => bench,
+            None => bench.insert(Bench::new(client, scene, rests.clone())?),
+        };
         report(bench.insert(insertion, manner)?);
+        rests.clone_from(&bench.rests);
     }
     Ok(())
+}
+
+/// Plays a step in which a group moves as one, in a scene of its own. Where it ends is not kept: the steps that follow find it where the design has it.
+fn play_group(
+    client: &Client,
+    scene: &AssemblyScene<'_>,
+    insertion: &Insertion,
+    rests: &[DAffine3],
+    manner: &Manner,
+) -> Result<Inserted, ScenarioError> {
+    let group = GroupScene::new(scene.model, insertion, rests)?;
+    let scene = AssemblyScene {
+        model: &group.model,
+        image: &group.image,
+        report: &group.report,
+    };
+    Bench::new(client, &scene, group.rests.clone())?.insert(&group.insertion, manner)
 }
 
 /// The rig, and where everything is on it.
@@ -149,7 +179,11 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(client: &'a Client, scene: &AssemblyScene<'a>) -> Result<Self, ScenarioError> {
+    fn new(
+        client: &'a Client,
+        scene: &AssemblyScene<'a>,
+        rests: Vec<DAffine3>,
+    ) -> Result<Self, ScenarioError> {
         if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
             client.request(ToDevice::ClearFault)?;
         }
@@ -161,7 +195,6 @@ impl<'a> Bench<'a> {
             every_ticks: HEED_TICKS,
         })?;
         let parts = (scene.report.parts.iter()).map(|part| part.model_part).collect();
-        let rests: Vec<DAffine3> = scene.model.parts.iter().map(|part| part.placement).collect();
         Ok(Self {
             play: Play::new(client),
             scene: *scene,

@@ -5,6 +5,7 @@
 //! function. [`probe`] finds gap and contacts of a scene at given poses, [`sweep`] the first touch along a motion. [`measure`], [`port`] and [`wire`] serve the computation of figures.
 
 mod error;
+mod group;
 mod hand;
 mod hand_way;
 pub mod insertions;

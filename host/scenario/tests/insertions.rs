@@ -32,9 +32,6 @@ fn steps(model: &CadModel) -> Vec<Insertion> {
     let found = sequence::disassemble(&assembly, &all, Duration::from_secs(60));
     assert!(found.complete(), "{found:?}");
     insertions(&assembly, &found)
-        .into_iter()
-        .map(Result::unwrap)
-        .collect()
 }
 
 fn image(model: &CadModel) -> Planned {
@@ -143,5 +140,52 @@ fn what_is_in_the_way_is_felt_and_named() {
         assert_eq!(moment.against.as_deref(), Some("obstacle"), "{inserted:?}");
         assert!(moment.left_mm > 0.3 * way.length(), "{inserted:?}");
         assert!(moment.force_n > 2.0, "{inserted:?}");
+    }
+}
+
+/// A bolt with another one end to end on it, of which the hand holds either: both move as one, and go in as the bolt alone does. Steps before and after, in the
+/// scene of all parts, are played on the same rig.
+#[test]
+fn a_group_moves_as_one() {
+    let mut model = read(PAIRS[0]);
+    let bolt = steps(&model)[0].clone();
+    let out = bolt.way[0].translation - bolt.way[bolt.way.len() - 1].translation;
+    let shape = &model.shapes[model.parts[bolt.part].shape];
+    let along = |p: &DVec3| {
+        model.parts[bolt.part]
+            .placement
+            .transform_point3(*p)
+            .dot(out.normalize())
+    };
+    let ends = shape.mesh.vertices.iter().map(along);
+    let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| {
+        (low.min(t), high.max(t))
+    });
+    let on_top = DAffine3::from_translation(out.normalize() * (high - low));
+    model.parts.push(Part {
+        name: "second".into(),
+        placement: on_top * model.parts[bolt.part].placement,
+        ..model.parts[bolt.part].clone()
+    });
+    let second = model.parts.len() - 1;
+    let planned = image(&model);
+    let held = Insertion {
+        with: vec![second],
+        ..bolt.clone()
+    };
+    let by_the_other = Insertion {
+        part: second,
+        with: vec![bolt.part],
+        onto: bolt.onto.clone(),
+        way: bolt.way.iter().map(|pose| on_top * *pose).collect(),
+    };
+    let steps = [bolt.clone(), held, by_the_other, bolt];
+    let all = played(&rig(), &model, &planned, &steps, &Manner::default());
+    let names: Vec<&str> = all.iter().map(|inserted| inserted.part.as_str()).collect();
+    assert_eq!(names, ["bolt", "bolt, second", "second, bolt", "bolt"]);
+    for inserted in &all {
+        println!("{}", inserted.words());
+        assert!(inserted.in_place && inserted.caught.is_empty(), "{inserted:?}");
+        assert!(inserted.peak.force_n < 5.0, "{inserted:?}");
     }
 }

@@ -30,6 +30,7 @@ pub mod graph;
 mod helix;
 mod hints;
 pub mod insertion;
+pub mod joined;
 mod kept;
 mod leg;
 mod line;

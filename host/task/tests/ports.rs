@@ -2,12 +2,10 @@
 
 mod support;
 
-use std::io::Write as _;
-
-use mortise_shapes::{Designed, KINDS};
+use mortise_shapes::KINDS;
 use mortise_task::graph::{Edge, graph};
 use mortise_task::ports::{Geometry, Port, ports};
-use mortise_task::{Assembly, catalogue, report};
+use mortise_task::{catalogue, report};
 
 fn kinds(edge: &Edge) -> Vec<&'static str> {
     edge.kinds.iter().map(|kind| kind.kind().name.as_str()).collect()
@@ -100,18 +98,6 @@ fn connections_have_their_kinds() {
     assert_eq!(connected("ball_in_cylinder.step"), ["ball"]);
 }
 
-/// A pair of `mortise-shapes` at its designed pose.
-fn fitted(seed: u64) -> (Designed, Assembly) {
-    let designed = Designed::random(seed);
-    let mut file = tempfile::Builder::new().suffix(".step").tempfile().unwrap();
-    file.write_all(designed.text().as_bytes()).unwrap();
-    let mut model = mortise_brep::load_step(file.path()).unwrap();
-    let named = |name: &str| model.parts.iter().position(|part| part.name == name).unwrap();
-    let (moving, fixed) = (named("moving"), named("fixed"));
-    model.parts[moving].placement = model.parts[fixed].placement * designed.pose();
-    (designed, Assembly::new(model).unwrap())
-}
-
 /// Plugs and shafts of any form in holes of theirs: connected as guided, with the designed clearance to the accuracy of the tessellation.
 #[test]
 fn profiles_in_their_holes_are_fits() {
@@ -124,7 +110,7 @@ fn profiles_in_their_holes_are_fits() {
     ] {
         for turn in 0..6 {
             let seed = turn * KINDS as u64 + kind;
-            let (designed, assembly) = fitted(seed);
+            let (designed, assembly) = support::random(seed);
             if name == "lobed" && designed.clearance == 0.0 {
                 continue;
             }
@@ -177,8 +163,8 @@ fn a_catalogue_states_what_a_file_cannot() {
     // What is welded does not come apart, and moves as one.
     let found = mortise_task::sequence::disassemble(&assembly, &[0, 1], std::time::Duration::from_secs(60));
     assert!(found.complete() && found.steps.is_empty());
-    let told = report::sequence(&assembly, &found, report::Sense::Disassembly);
-    assert_eq!(told.joined, [[a.as_str(), b.as_str()]]);
+    let stated = report::sequence(&assembly, &found, report::Sense::Disassembly);
+    assert_eq!(stated.joined, [[a.as_str(), b.as_str()]]);
     // A thread that no name tells.
     let shaft = edges.edge_weights().next().unwrap().fits[0].parts[0];
     let name = assembly.name(shaft).to_owned();

@@ -8,9 +8,9 @@ use mortise_rig::{Client, RigSpec};
 use mortise_scenario::ScenarioError;
 use mortise_scenario::insertions::{AssemblyScene, Inserted, Manner, play_insertions};
 use mortise_task::Assembly;
-use mortise_task::insertion::{Insertion, insertions};
+use mortise_task::insertion::insertions;
 use mortise_task::report::SequenceReport;
-use mortise_task::sequence::{Sequence, Step};
+use mortise_task::sequence::Sequence;
 use serde::Serialize;
 
 /// Steps that a simulated hand has done.
@@ -18,8 +18,6 @@ use serde::Serialize;
 pub struct Played {
     rig: String,
     insertions: Vec<Inserted>,
-    /// Groups of parts that would have to move together, which one hand cannot do.
-    left_out: Vec<Vec<String>>,
     /// A sentence on each step of the sequence, in the order of assembly.
     #[serde(skip)]
     felt: Vec<String>,
@@ -48,9 +46,8 @@ pub fn connect(rig: &RigSpec) -> anyhow::Result<Client> {
 /// Plays the steps with a simulated hand; each is printed once it is known, or none with `json`.
 pub fn play(assembly: &Assembly, found: &Sequence, client: &Client, json: bool) -> anyhow::Result<Played> {
     let steps = insertions(assembly, found);
-    let playable: Vec<Insertion> = steps.iter().flatten().cloned().collect();
     let mut inserted = Vec::new();
-    if !playable.is_empty() {
+    if !steps.is_empty() {
         let request = Request {
             grabbable: Grabbable::All,
             ..Request::default()
@@ -62,7 +59,7 @@ pub fn play(assembly: &Assembly, found: &Sequence, client: &Client, json: bool) 
             report: &planned.plan.report,
         };
         let mut printed = Ok(());
-        play_insertions(client, &scene, &playable, &Manner::default(), &mut |one| {
+        play_insertions(client, &scene, &steps, &Manner::default(), &mut |one| {
             if !json && printed.is_ok() {
                 printed = lines::text(&one.words());
             }
@@ -70,38 +67,17 @@ pub fn play(assembly: &Assembly, found: &Sequence, client: &Client, json: bool) 
         })?;
         printed?;
     }
-    let group = |step: &Step| -> Vec<String> {
-        let names = step.group.iter().map(|part| assembly.name(*part));
-        names.map(str::to_owned).collect()
-    };
-    let mut words = inserted.iter().map(Inserted::words);
-    let felt = (steps.iter())
-        .map(|step| match step {
-            Ok(_) => words.next().unwrap_or_default(),
-            Err(step) => not_played(&group(step)),
-        })
-        .collect();
     Ok(Played {
         rig: client.name().to_owned(),
-        left_out: (steps.iter().filter_map(|step| step.as_ref().err()))
-            .map(|step| group(step))
-            .collect(),
+        felt: inserted.iter().map(Inserted::words).collect(),
         insertions: inserted,
-        felt,
     })
 }
 
-fn not_played(group: &[String]) -> String {
-    format!(
-        "not played: {} would move together, a hand holds one part",
-        group.join(", ")
-    )
-}
-
 impl Played {
-    /// Whether every step was played, and every part went in.
+    /// Whether every part and group went in.
     pub fn all_in(&self) -> bool {
-        self.left_out.is_empty() && self.insertions.iter().all(|inserted| inserted.in_place)
+        self.insertions.iter().all(|inserted| inserted.in_place)
     }
 
     /// A sentence on each step of the sequence, in the order of assembly.
@@ -123,7 +99,7 @@ impl Played {
     }
 
     fn words(&self) -> String {
-        if self.insertions.is_empty() && self.left_out.is_empty() {
+        if self.insertions.is_empty() {
             return "nothing to play: no step was found".into();
         }
         let put_in = (self.insertions.iter())
@@ -131,11 +107,8 @@ impl Played {
             .count();
         let force = (self.insertions.iter()).fold(0.0, |most: f64, inserted| most.max(inserted.peak.force_n));
         let missed: u32 = self.insertions.iter().map(|inserted| inserted.missed_ticks).sum();
-        let left_out: String = (self.left_out.iter())
-            .map(|group| format!("; {}", not_played(group)))
-            .collect();
         format!(
-            "by a simulated hand on {}: {put_in} of {} in, at most {force:.2} N, {missed} ticks missed{left_out}",
+            "by a simulated hand on {}: {put_in} of {} in, at most {force:.2} N, {missed} ticks missed",
             self.rig,
             self.insertions.len(),
         )

@@ -1,7 +1,9 @@
 //! Files of the tests.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use mortise_shapes::Designed;
 use mortise_task::Assembly;
 
 /// An assembly of the repository.
@@ -29,4 +31,17 @@ pub fn shared(test: &str) -> Option<PathBuf> {
 #[allow(dead_code)]
 pub fn load(folder: &Path, name: &str) -> Assembly {
     Assembly::new(mortise_brep::load_step(folder.join(name)).unwrap()).unwrap()
+}
+
+/// A pair of `mortise-shapes` at its designed pose.
+#[allow(dead_code)]
+pub fn random(seed: u64) -> (Designed, Assembly) {
+    let designed = Designed::random(seed);
+    let mut file = tempfile::Builder::new().suffix(".step").tempfile().unwrap();
+    file.write_all(designed.text().as_bytes()).unwrap();
+    let mut model = mortise_brep::load_step(file.path()).unwrap();
+    let named = |name: &str| model.parts.iter().position(|part| part.name == name).unwrap();
+    let (moving, fixed) = (named("moving"), named("fixed"));
+    model.parts[moving].placement = model.parts[fixed].placement * designed.pose();
+    (designed, Assembly::new(model).unwrap())
 }

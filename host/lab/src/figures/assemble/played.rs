@@ -18,7 +18,7 @@ use crate::guided::{SIM, emulated};
 use crate::{LabError, generated};
 
 const MOTOR: &str = "05_motor/motor_flat.step";
-/// Tasks of extraction and whole assemblies with a way or an order; those of two groups are played as far as a hand holds one part.
+/// Tasks of extraction and whole assemblies with a way or an order. The leaves of the hinge come together with their bushes.
 const OTHERS: [&str; 13] = [
     "10_extraction/bent_tube.step",
     "10_extraction/box_with_board.step",
@@ -34,8 +34,6 @@ const OTHERS: [&str; 13] = [
     "10_extraction/ubolt_plate.step",
     "real/as1-oc-214.stp",
 ];
-/// Steps of these that bring two groups together: the leaves of the hinge with their bushes.
-const GROUPS: usize = 1;
 /// Hands that put the motor together, each off in a direction of its own.
 const HANDS: usize = 10;
 const SEED: u64 = 18;
@@ -59,7 +57,7 @@ impl Ready {
     fn new(file: &Path, assembly: Assembly) -> Result<Self, LabError> {
         let all: Vec<usize> = (0..assembly.count()).collect();
         let found = sequence::disassemble(&assembly, &all, Duration::from_secs(SEARCH_S));
-        let steps = insertions(&assembly, &found).into_iter().flatten().collect();
+        let steps = insertions(&assembly, &found);
         let request = Request {
             grabbable: Grabbable::All,
             ..Request::default()
@@ -164,7 +162,6 @@ pub(super) fn measure(cad: &Path, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
         wanted += ready.assembly.count() - 1;
         others.extend(ready.play(&SIM, &Manner::default())?);
     }
-    wanted -= GROUPS;
     let what = format!("{} other assemblies and tasks of extraction played", OTHERS.len());
     rows(&what, &others, wanted, out);
     caught(&what, &others, out);
