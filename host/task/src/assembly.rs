@@ -167,15 +167,13 @@ impl Assembly {
         }
     }
 
-    /// A part with those that it is permanently connected to, and all others.
-    pub fn with_joined(&self, part: usize) -> (Vec<usize>, Vec<usize>) {
+    /// Some parts with those that they are permanently connected to, and all others.
+    pub fn with_joined(&self, group: &[usize]) -> (Vec<usize>, Vec<usize>) {
         let all: Vec<usize> = (0..self.count()).collect();
-        let mut units = self.stated.units(&all).into_iter();
-        let unit = units
-            .find(|unit| unit.contains(&part))
-            .unwrap_or_else(|| vec![part]);
-        let others = all.into_iter().filter(|part| !unit.contains(part)).collect();
-        (unit, others)
+        let units = self.stated.units(&all).into_iter();
+        let is_moved = |unit: &Vec<usize>| unit.iter().any(|part| group.contains(part));
+        let (moved, others): (Vec<_>, Vec<_>) = units.partition(is_moved);
+        (moved.concat(), others.concat())
     }
 
     /// The prepared shape of a part.

@@ -73,11 +73,16 @@ impl<'a> Blocking<'a> {
         &self.directions
     }
 
-    /// The smallest group of `set` that leaves it along one of the directions, of equally many parts the one of least volume; `None` also where `until` is
-    /// over first.
-    pub fn leaving(&mut self, set: &[usize], until: &Deadline) -> Option<Leaving> {
-        match self.single(set, until) {
-            Ok(None) => self.group(set, until).ok().flatten(),
+    /// The smallest group of `set` that leaves it along one of the directions, of equally many parts the one of least volume, among those that `accept` takes;
+    /// `None` also where `until` is over first.
+    pub fn leaving(
+        &mut self,
+        set: &[usize],
+        accept: &mut dyn FnMut(&[usize]) -> bool,
+        until: &Deadline,
+    ) -> Option<Leaving> {
+        match self.single(set, accept, until) {
+            Ok(None) => self.group(set, accept, until).ok().flatten(),
             Ok(found) => found,
             Err(Over) => None,
         }
@@ -89,7 +94,12 @@ impl<'a> Blocking<'a> {
     }
 
     /// The smallest part of `set` that leaves it.
-    fn single(&mut self, set: &[usize], until: &Deadline) -> Result<Option<Leaving>, Over> {
+    fn single(
+        &mut self,
+        set: &[usize],
+        accept: &mut dyn FnMut(&[usize]) -> bool,
+        until: &Deadline,
+    ) -> Result<Option<Leaving>, Over> {
         if set.len() < 2 {
             return Ok(None);
         }
@@ -97,6 +107,9 @@ impl<'a> Blocking<'a> {
         let mut order = set.to_vec();
         order.sort_by(|&a, &b| self.volume(&[a]).total_cmp(&self.volume(&[b])));
         for part in order {
+            if !accept(&[part]) {
+                continue;
+            }
             for line in 0..self.directions.len() {
                 for against in [false, true] {
                     let key = (part, line, against);
@@ -188,7 +201,12 @@ impl<'a> Blocking<'a> {
     }
 
     /// The smallest group of `set` that leaves it, by whole graphs.
-    fn group(&mut self, set: &[usize], until: &Deadline) -> Result<Option<Leaving>, Over> {
+    fn group(
+        &mut self,
+        set: &[usize],
+        accept: &mut dyn FnMut(&[usize]) -> bool,
+        until: &Deadline,
+    ) -> Result<Option<Leaving>, Over> {
         let assembly = self.assembly;
         let mut found: Vec<Leaving> = Vec::new();
         for line in 0..self.directions.len() {
@@ -210,6 +228,7 @@ impl<'a> Blocking<'a> {
                 found.extend(groups.map(|parts| Leaving { parts, direction }));
             }
         }
+        found.retain(|leaving| accept(&leaving.parts));
         let least = found.into_iter().min_by(|a, b| {
             let count = a.parts.len().cmp(&b.parts.len());
             count.then_with(|| self.volume(&a.parts).total_cmp(&self.volume(&b.parts)))

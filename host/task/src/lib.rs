@@ -50,10 +50,12 @@ pub mod sequence;
 mod shorten;
 mod skeleton;
 mod stated;
+mod support;
 pub mod taxonomy;
 mod threads;
 mod walk;
 mod way;
+mod wishes;
 mod work;
 
 pub use assembly::{ALLOWED_MM, Assembly, Clearance, Moved, SEARCH_STEP_MM};
@@ -63,3 +65,4 @@ pub use deadline::Deadline;
 pub use error::TaskError;
 pub use motion::Motion;
 pub use proof::Proof;
+pub use wishes::Wishes;

@@ -77,6 +77,8 @@ pub struct StepReport<'a> {
     pub overlap_um: Option<f64>,
     /// The pair that is nearest.
     pub nearest: Option<[&'a str; 2]>,
+    /// Parts that stay and would fall without those that move: they are held meanwhile.
+    pub falls: Vec<&'a str>,
 }
 
 impl StepReport<'_> {
@@ -101,7 +103,12 @@ impl StepReport<'_> {
         } else {
             String::new()
         };
-        format!("{} {}{legs}: {gap}", self.moving.join(", "), self.way())
+        let falls = if self.falls.is_empty() {
+            String::new()
+        } else {
+            format!("; hold {} meanwhile", self.falls.join(", "))
+        };
+        format!("{} {}{legs}: {gap}{falls}", self.moving.join(", "), self.way())
     }
 }
 
@@ -256,6 +263,7 @@ fn step_report<'a>(assembly: &'a Assembly, step: &Step, number: usize, sense: Se
         clearance_um: distance.map(|d| d.max(0.0)),
         overlap_um: step.measured.then_some(distance.map_or(0.0, |d| (-d).max(0.0))),
         nearest: step.least.map(|l| l.pair.map(|p| assembly.name(p))),
+        falls: names(assembly, &step.falls),
     }
 }
 
@@ -282,11 +290,11 @@ fn pressed(assembly: &Assembly) -> Vec<PressedReport<'_>> {
         .collect()
 }
 
-/// Freedoms of one part.
+/// Freedoms of one part or group.
 #[derive(Clone, Debug, Serialize)]
 pub struct PartMobility<'a> {
-    /// Its name.
-    pub part: &'a str,
+    /// Its name, or those of a group.
+    pub part: String,
     /// Dimensions of translation that its contacts leave both ways, to first order.
     pub two_sided: usize,
     /// Extreme rays that they leave one way, to first order.
@@ -325,13 +333,13 @@ pub struct RotationReport {
     pub range_deg: [f64; 2],
 }
 
-/// Freedoms of some parts, each with those that it is permanently connected to, against all others in place.
-pub fn mobility<'a>(assembly: &'a Assembly, parts: &[usize]) -> Vec<PartMobility<'a>> {
-    parts
+/// Freedoms of some groups, each with the parts that it is permanently connected to, against all others in place.
+pub fn mobility<'a>(assembly: &'a Assembly, groups: &[Vec<usize>]) -> Vec<PartMobility<'a>> {
+    groups
         .iter()
-        .map(|&part| {
-            let (unit, others) = assembly.with_joined(part);
-            part_mobility(assembly, part, &freedoms_of(assembly, &unit, &others))
+        .map(|group| {
+            let (unit, others) = assembly.with_joined(group);
+            part_mobility(assembly, group, &freedoms_of(assembly, &unit, &others))
         })
         .collect()
 }
@@ -341,10 +349,10 @@ fn freedoms_of(assembly: &Assembly, parts: &[usize], others: &[usize]) -> Freedo
     freedoms(assembly, &Moved { parts, by }, others, &[])
 }
 
-fn part_mobility<'a>(assembly: &'a Assembly, part: usize, found: &Freedoms) -> PartMobility<'a> {
+fn part_mobility<'a>(assembly: &'a Assembly, group: &[usize], found: &Freedoms) -> PartMobility<'a> {
     let tidy = |d: [f64; 3]| (DVec3::from_array(d) + 0.0).to_array();
     PartMobility {
-        part: assembly.name(part),
+        part: names(assembly, group).join(", "),
         two_sided: found.lines,
         one_sided: found.rays,
         translations: (found.translations.iter())
@@ -406,7 +414,7 @@ pub fn free_connections(assembly: &Assembly) -> Vec<FreeConnection<'_>> {
     (connections(assembly).into_iter().zip(parts))
         .map(|(connection, [first, second])| FreeConnection {
             connection,
-            freedoms: part_mobility(assembly, first, &freedoms_of(assembly, &[first], &[second])),
+            freedoms: part_mobility(assembly, &[first], &freedoms_of(assembly, &[first], &[second])),
         })
         .collect()
 }

@@ -13,12 +13,14 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Clearance, Moved};
-use crate::blocking::Blocking;
+use crate::blocking::{Blocking, Leaving};
 use crate::deadline::Deadline;
 use crate::directions::candidates;
 use crate::line::same_direction;
 use crate::motion::Motion;
 use crate::removal::{Blocked, Budget, Path, Removal, remove};
+use crate::support::Support;
+use crate::wishes::Wishes;
 
 /// Travel between checks of samples in contact when a step is measured, mm.
 pub const MEASURE_STEP_MM: f64 = 0.25;
@@ -40,6 +42,8 @@ pub struct Step {
     pub least: Option<Clearance>,
     /// Whether it was measured.
     pub measured: bool,
+    /// Parts that stay and would fall without the group: they are held by hand meanwhile.
+    pub falls: Vec<usize>,
 }
 
 /// What a search found.
@@ -89,6 +93,16 @@ pub fn directions(assembly: &Assembly, set: &[usize]) -> Vec<DVec3> {
 
 /// Takes the parts of `set` apart before `end`.
 pub fn disassemble(assembly: &Assembly, set: &[usize], end: impl Into<Deadline>) -> Sequence {
+    disassemble_as(assembly, set, &Wishes::default(), end)
+}
+
+/// Takes the parts of `set` apart before `end` as a user wishes: held parts stay, and a group whose parts do not fall without it leaves first if there is one.
+pub fn disassemble_as(
+    assembly: &Assembly,
+    set: &[usize],
+    wishes: &Wishes,
+    end: impl Into<Deadline>,
+) -> Sequence {
     let (start, end) = (Instant::now(), end.into());
     // A tenth is left for measuring.
     let until = end.share(0.9);
@@ -99,16 +113,17 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], end: impl Into<Deadline>)
         time: Duration::ZERO,
     };
     let mut blocking = Blocking::new(assembly, directions(assembly, set));
+    let mut support = Support::new(assembly, wishes);
     let mut open = vec![set.to_vec()];
     while let Some(set) = open.pop() {
-        if assembly.stated.units(&set).len() < 2 {
+        if units(assembly, wishes, &set).len() < 2 {
             continue;
         }
         if until.is_over() {
             found.timed_out = true;
             break;
         }
-        match split(assembly, &mut blocking, &set, &until) {
+        match split((assembly, wishes), &mut blocking, &mut support, &set, &until) {
             Ok(step) => {
                 open.push(step.onto.clone());
                 open.push(step.group.clone());
@@ -133,8 +148,9 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], end: impl Into<Deadline>)
 
 /// Splits a set: the smallest group that leaves straight, else a part that leaves on several legs.
 fn split(
-    assembly: &Assembly,
+    (assembly, wishes): (&Assembly, &Wishes),
     blocking: &mut Blocking<'_>,
+    support: &mut Support<'_>,
     set: &[usize],
     until: &Deadline,
 ) -> Result<Step, (Blocked, bool)> {
@@ -144,7 +160,7 @@ fn split(
             .filter(|p| !group.contains(p))
             .collect::<Vec<_>>()
     };
-    if let Some(leaving) = blocking.leaving(set, until) {
+    if let Some(leaving) = leaving(wishes, blocking, support, set, until) {
         let onto = rest(&leaving.parts);
         let moved = Moved {
             parts: &leaving.parts,
@@ -155,6 +171,7 @@ fn split(
             legs: vec![Motion::slide(leaving.direction * far)],
         };
         return Ok(Step {
+            falls: support.falling(&onto),
             group: leaving.parts,
             onto,
             path,
@@ -162,8 +179,13 @@ fn split(
             measured: false,
         });
     }
-    let mut groups = assembly.stated.units(set);
-    groups.sort_by(|a, b| volume(assembly, a).total_cmp(&volume(assembly, b)));
+    let mut groups = units(assembly, wishes, set);
+    let mut order = |group: &[usize]| (support.falling(&rest(group)).len(), volume(assembly, group));
+    groups.sort_by_cached_key(|group| {
+        let (falls, volume) = order(group);
+        // The order of the bits of a number that is not negative is its own.
+        (falls, volume.to_bits())
+    });
     if groups.len() == 2 {
         // Either part is the other's obstacle: one search is enough.
         groups.truncate(1);
@@ -171,6 +193,7 @@ fn split(
         let pairs = pairs(assembly, &groups);
         groups.extend(pairs);
     }
+    groups.retain(|group| !wishes.hold_one_of(group));
     let mut worst: Option<Blocked> = None;
     let mut timed_out = false;
     let count = groups.len();
@@ -188,6 +211,7 @@ fn split(
         match remove(assembly, &group, &onto, &[], &budget) {
             Removal::Out(path) => {
                 return Ok(Step {
+                    falls: support.falling(&onto),
                     group,
                     onto,
                     path,
@@ -208,6 +232,48 @@ fn split(
         proof: None,
     });
     Err((blocked, timed_out))
+}
+
+/// Sets of parts that are not split: joined ones, and those that are held.
+fn units(assembly: &Assembly, wishes: &Wishes, set: &[usize]) -> Vec<Vec<usize>> {
+    let units = assembly.stated.units(set).into_iter();
+    let (held, mut free): (Vec<_>, Vec<_>) = units.partition(|unit| wishes.hold_one_of(unit));
+    if !held.is_empty() {
+        let mut held = held.concat();
+        held.sort_unstable();
+        free.push(held);
+    }
+    free
+}
+
+/// A group that leaves straight: one without which nothing falls, else any; one that holds a fixed part stays, and the rest leaves the other way.
+fn leaving(
+    wishes: &Wishes,
+    blocking: &mut Blocking<'_>,
+    support: &mut Support<'_>,
+    set: &[usize],
+    until: &Deadline,
+) -> Option<Leaving> {
+    let rest =
+        |group: &[usize]| -> Vec<usize> { set.iter().copied().filter(|p| !group.contains(p)).collect() };
+    if wishes.down.is_some() {
+        let before = support.falling(set).len();
+        let mut stands =
+            |group: &[usize]| !wishes.hold_one_of(group) && support.falling(&rest(group)).len() <= before;
+        if let Some(leaving) = blocking.leaving(set, &mut stands, until) {
+            return Some(leaving);
+        }
+    }
+    let free = blocking.leaving(set, &mut |group| !wishes.hold_one_of(group), until);
+    if free.is_some() || wishes.held.is_empty() {
+        return free;
+    }
+    let mut holds = |group: &[usize]| !wishes.hold_one_of(&rest(group));
+    let held = blocking.leaving(set, &mut holds, until)?;
+    Some(Leaving {
+        parts: rest(&held.parts),
+        direction: -held.direction,
+    })
 }
 
 /// The one of two blocks that is proved, or else lacks less.

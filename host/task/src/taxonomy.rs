@@ -102,6 +102,9 @@ pub struct ConnectionKind {
     /// Whether it does not come apart.
     #[serde(default)]
     permanent: bool,
+    /// Whether neither part falls out of it.
+    #[serde(default)]
+    pub grips: bool,
     /// Whether it only groups others: no two parts are connected by it.
     #[serde(default)]
     pub group: bool,

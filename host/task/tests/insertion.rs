@@ -22,6 +22,7 @@ fn step(group: &[usize], onto: &[usize]) -> Step {
         },
         least: None,
         measured: false,
+        falls: Vec::new(),
     }
 }
 

@@ -5,13 +5,14 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use glam::DVec3;
 use mortise_brep::LoadOptions;
 use mortise_output::{Existing, Output, lines};
 use mortise_rig::RigSpec;
 use mortise_task::removal::{Budget, Removal, remove};
 use mortise_task::report::{self, Sense, SequenceReport};
 use mortise_task::sequence::{self, Sequence, Step};
-use mortise_task::{Assembly, catalogue, ports};
+use mortise_task::{Assembly, Wishes, catalogue, ports};
 use serde::Serialize;
 
 use super::played::{self, Played};
@@ -35,9 +36,9 @@ struct Source {
 pub struct MobilityArgs {
     #[command(flatten)]
     source: Source,
-    /// One part instead of all
+    /// One part instead of all; given several times, these parts as a group
     #[arg(long, value_name = "PART")]
-    part: Option<String>,
+    part: Vec<String>,
     /// One JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -61,9 +62,25 @@ pub struct SearchArgs {
     /// Limit on the time of the search, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = super::units::seconds, allow_negative_numbers = true)]
     time: u64,
+    /// Part that a fixture holds and that never moves; may be given several times
+    #[arg(long, value_name = "PART")]
+    held: Vec<String>,
+    /// Direction in which parts fall: x, y, z, -x, -y, -z, or three numbers with commas. Parts that stay are not to fall, and are named where they would
+    #[arg(long, value_name = "DIRECTION", value_parser = super::units::direction, allow_hyphen_values = true)]
+    down: Option<DVec3>,
     /// One JSON object instead of a table
     #[arg(long)]
     json: bool,
+}
+
+impl SearchArgs {
+    fn wishes(&self, assembly: &Assembly) -> anyhow::Result<Wishes> {
+        let held = self.held.iter().map(|name| Ok(assembly.part(name)?));
+        Ok(Wishes {
+            held: held.collect::<anyhow::Result<_>>()?,
+            down: self.down,
+        })
+    }
 }
 
 /// Arguments of `assemble`.
@@ -88,7 +105,7 @@ pub struct DisassembleArgs {
     #[command(flatten)]
     search: SearchArgs,
     /// Take out this part alone, the others in place [default: take everything apart]
-    #[arg(long, value_name = "PART")]
+    #[arg(long, value_name = "PART", conflicts_with_all = ["held", "down"])]
     part: Option<String>,
 }
 
@@ -117,11 +134,13 @@ impl Source {
 /// Runs `mobility`.
 pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
     let assembly = args.source.read()?;
-    let parts = match &args.part {
-        Some(name) => vec![assembly.part(name)?],
-        None => (0..assembly.count()).collect(),
+    let named = args.part.iter().map(|name| Ok(assembly.part(name)?));
+    let named: Vec<usize> = named.collect::<anyhow::Result<_>>()?;
+    let groups = match &named[..] {
+        [] => (0..assembly.count()).map(|part| vec![part]).collect(),
+        _ => vec![named],
     };
-    let found = report::mobility(&assembly, &parts);
+    let found = report::mobility(&assembly, &groups);
     if args.json {
         #[derive(Serialize)]
         struct Report<'a> {
@@ -135,7 +154,7 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     for part in &found {
-        lines::text(part.part)?;
+        lines::text(&part.part)?;
         for t in &part.translations {
             let reach = match (t.range_mm, t.meets) {
                 (Some(range), Some(meets)) => format!("{range:.3} mm to {meets}"),
@@ -172,7 +191,9 @@ pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
     let client = args.play.as_ref().map(played::connect).transpose()?;
     let assembly = args.search.source.read()?;
     let all: Vec<usize> = (0..assembly.count()).collect();
-    let found = sequence::disassemble(&assembly, &all, Duration::from_secs(args.search.time));
+    let wishes = args.search.wishes(&assembly)?;
+    let time = Duration::from_secs(args.search.time);
+    let found = sequence::disassemble_as(&assembly, &all, &wishes, time);
     let report = report::sequence(&assembly, &found, Sense::Assembly);
     let json = args.search.json;
     let mut code = ExitCode::SUCCESS;
@@ -202,9 +223,11 @@ pub fn disassemble(args: &DisassembleArgs) -> anyhow::Result<ExitCode> {
     let search = &args.search;
     let assembly = search.source.read()?;
     let time = Duration::from_secs(search.time);
+    let all: Vec<usize> = (0..assembly.count()).collect();
+    let wishes = search.wishes(&assembly)?;
     let found = match &args.part {
         Some(name) => take_out(&assembly, assembly.part(name)?, time),
-        None => sequence::disassemble(&assembly, &(0..assembly.count()).collect::<Vec<_>>(), time),
+        None => sequence::disassemble_as(&assembly, &all, &wishes, time),
     };
     print_sequence(
         &report::sequence(&assembly, &found, Sense::Disassembly),
@@ -215,7 +238,7 @@ pub fn disassemble(args: &DisassembleArgs) -> anyhow::Result<ExitCode> {
 /// Removal of one part, with those that it is permanently connected to, from all others in place.
 fn take_out(assembly: &Assembly, part: usize, time: Duration) -> Sequence {
     let start = Instant::now();
-    let (group, onto) = assembly.with_joined(part);
+    let (group, onto) = assembly.with_joined(&[part]);
     let mut found = Sequence {
         steps: Vec::new(),
         stuck: Vec::new(),
@@ -230,6 +253,7 @@ fn take_out(assembly: &Assembly, part: usize, time: Duration) -> Sequence {
                 path,
                 least: None,
                 measured: false,
+                falls: Vec::new(),
             };
             // A way that was found is measured, also when the time is nearly over.
             if let Some(least) = sequence::measure(assembly, &step, &time.into()) {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use glam::DVec3;
 use mortise_rig::RigSpec;
 
 /// Millimetres of `5um`, `5µm` or `0.005mm`.
@@ -64,6 +65,27 @@ pub fn instructions(text: &str) -> Result<u64, String> {
     })
 }
 
+/// Unit vector of `x`, `-z`, or three numbers such as `0,0.6,-0.8`.
+pub fn direction(text: &str) -> Result<DVec3, String> {
+    let unsigned = text.trim();
+    let unsigned = unsigned.strip_prefix(['+', '-']).unwrap_or(unsigned);
+    let axis = match unsigned {
+        "x" => Some(DVec3::X),
+        "y" => Some(DVec3::Y),
+        "z" => Some(DVec3::Z),
+        _ => None,
+    };
+    let sign = if text.trim().starts_with('-') { -1.0 } else { 1.0 };
+    let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    let by_numbers = || match numbers?[..] {
+        [x, y, z] => DVec3::new(x, y, z).try_normalize(),
+        _ => None,
+    };
+    (axis.map(|axis| axis * sign).or_else(by_numbers)).ok_or_else(|| {
+        format!("`{text}` is not a direction; write x, -z, or three numbers such as 0,0.6,-0.8")
+    })
+}
+
 /// A rig.
 pub fn rig(text: &str) -> Result<RigSpec, String> {
     text.parse()
@@ -89,6 +111,18 @@ mod tests {
         assert_eq!((seconds("1"), seconds("90s")), (Ok(1), Ok(90)));
         for text in ["", "0", "-1", "1.5", "NaN", "86401", "1e9", "s"] {
             assert!(seconds(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn directions() {
+        assert_eq!(direction("-z"), Ok(DVec3::NEG_Z));
+        assert_eq!(direction("+x"), Ok(DVec3::X));
+        assert_eq!(direction("0, 3,-4"), Ok(DVec3::new(0.0, 0.6, -0.8)));
+        for text in [
+            "", "w", "--z", "-", "0,0,0", "1,2", "1,2,3,4", "nan,0,0", "inf,0,0", "x,y,z",
+        ] {
+            assert!(direction(text).is_err(), "{text}");
         }
     }
 
