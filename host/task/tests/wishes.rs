@@ -30,17 +30,7 @@ fn held_parts_do_not_move() {
         let found = taken_apart(&assembly, &wishes);
         assert_eq!(found.steps.len(), assembly.count() - 1);
         for step in &found.steps {
-            assert!(!step.group.contains(&held), "{step:?}");
-            let (from, way) = step.path.reversed();
-            let moved = Moved {
-                parts: &step.group,
-                by: from
-                    * way
-                        .legs
-                        .iter()
-                        .fold(DAffine3::IDENTITY, |by, leg| leg.at(1.0) * by),
-            };
-            assert!(step.measured && !moved.parts.is_empty());
+            assert!(!step.group.contains(&held) && step.measured, "{step:?}");
         }
     }
 }
