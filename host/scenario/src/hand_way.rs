@@ -203,6 +203,7 @@ mod tests {
             let center = pose(&mut random).translation;
             let way: Vec<DAffine3> = (0..count).map(|_| pose(&mut random)).collect();
             let insertion = Insertion {
+                with: Vec::new(),
                 part: 0,
                 onto: Vec::new(),
                 way: way.clone(),

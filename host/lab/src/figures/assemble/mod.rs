@@ -6,6 +6,7 @@ mod channels;
 mod checked;
 mod extraction;
 mod interlocked;
+mod iso;
 mod large;
 mod played;
 mod sequences;
@@ -19,6 +20,7 @@ const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to thei
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     sequences::own(out)?;
+    iso::measure(out)?;
     extraction::own(plan, out)?;
     interlocked::measure(plan, out)?;
     large::measure(plan, out)?;
