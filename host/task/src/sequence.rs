@@ -186,14 +186,16 @@ fn split(
         // The order of the bits of a number that is not negative is its own.
         (falls, volume.to_bits())
     });
-    if groups.len() == 2 {
-        // Either part is the other's obstacle: one search is enough.
-        groups.truncate(1);
-    } else if groups.len() > 3 {
+    let count = groups.len();
+    if count > 3 {
         let pairs = pairs(assembly, &groups);
         groups.extend(pairs);
     }
     groups.retain(|group| !wishes.hold_one_of(group));
+    if count == 2 {
+        // Either is the other's obstacle: one search is enough.
+        groups.truncate(1);
+    }
     let mut worst: Option<Blocked> = None;
     let mut timed_out = false;
     let count = groups.len();

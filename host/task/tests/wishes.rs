@@ -35,6 +35,24 @@ fn held_parts_do_not_move() {
     }
 }
 
+/// Either of two parts with a way of several legs can be the one that is held.
+#[test]
+fn the_other_part_leaves_on_several_legs() {
+    let Some(folder) = support::shared("the_other_part_leaves_on_several_legs") else {
+        return;
+    };
+    let assembly = support::load(&folder.join("10_extraction"), "cross_pin.step");
+    for held in [0, 1] {
+        let wishes = Wishes {
+            held: vec![held],
+            down: None,
+        };
+        let found = taken_apart(&assembly, &wishes);
+        assert_eq!(found.steps[0].group, [1 - held]);
+        assert!(found.steps[0].path.legs.len() > 1);
+    }
+}
+
 #[test]
 fn two_held_parts_are_not_taken_apart() {
     let assembly = support::own(OWN);
