@@ -30,10 +30,15 @@ const STYLE: &str = "body{font:14px/1.5 system-ui,sans-serif;max-width:1240px;ma
     figure{margin:0;border:1px solid #d5dbe3;border-radius:6px;overflow:hidden}figcaption{padding:.4rem .7rem}img{display:block;width:100%}\
     .stuck{color:#9a3412}";
 
-/// The page of a sequence that was found for `assembly`, in the order of assembly. `felt` has a sentence on how each step is felt, or nothing.
-///
-/// Cost: a picture a step, on all cores.
-pub fn page(title: &str, assembly: &Assembly, found: &Sequence, felt: &[String]) -> String {
+/// The page of a sequence that was found for `assembly`, in the order of assembly, with its [`pictures()`]. `felt` has a sentence on how each step is felt,
+/// or nothing.
+pub fn page(
+    title: &str,
+    assembly: &Assembly,
+    found: &Sequence,
+    pictures: &[Picture],
+    felt: &[String],
+) -> String {
     let report = report::sequence(assembly, found, Sense::Assembly);
     let title = escaped(title);
     let mut page = format!(
@@ -44,7 +49,7 @@ pub fn page(title: &str, assembly: &Assembly, found: &Sequence, felt: &[String])
     for stuck in &report.stuck {
         let _ = writeln!(page, "<p class=\"stuck\">{}</p>", escaped(&stuck.words()));
     }
-    pictures(&mut page, assembly, found, &report);
+    figures(&mut page, pictures, &report);
     table(&mut page, &report);
     if !felt.is_empty() {
         page.push_str("<h2>Put together by a simulated hand, with contact</h2>\n<ol>\n");
@@ -85,18 +90,17 @@ fn verdict(report: &SequenceReport<'_>) -> String {
 }
 
 /// A figure a step.
-fn pictures(page: &mut String, assembly: &Assembly, found: &Sequence, report: &SequenceReport<'_>) {
+fn figures(page: &mut String, pictures: &[Picture], report: &SequenceReport<'_>) {
     if report.steps.is_empty() {
         return;
     }
-    if report.steps.len() > MOST_PICTURES {
+    if pictures.is_empty() {
         let _ = writeln!(page, "<p>Without pictures: more than {MOST_PICTURES} steps.</p>");
         return;
     }
-    let steps: Vec<&Step> = found.steps.iter().rev().collect();
-    let figures: Vec<String> = (steps.par_iter().zip(&report.steps))
-        .map(|(step, words)| {
-            let data = BASE64_STANDARD.encode(png(&step_picture(assembly, step)));
+    let figures: Vec<String> = (pictures.par_iter().zip(&report.steps))
+        .map(|(picture, words)| {
+            let data = BASE64_STANDARD.encode(png(picture));
             let words = escaped(&format!("{}. {}", words.step, words.words()));
             format!("<figure><img alt=\"{words}\" src=\"data:image/png;base64,{data}\"><figcaption>{words}</figcaption></figure>\n")
         })
@@ -106,6 +110,17 @@ fn pictures(page: &mut String, assembly: &Assembly, found: &Sequence, report: &S
         "<h2>Steps</h2>\n<div class=\"steps\">\n{}</div>\n",
         figures.concat()
     );
+}
+
+/// A picture of each step, in the order of assembly; none where there are more than 100 steps.
+///
+/// Cost: on all cores, some milliseconds for 10,000 triangles of a picture.
+pub fn pictures(assembly: &Assembly, found: &Sequence) -> Vec<Picture> {
+    if found.steps.len() > MOST_PICTURES {
+        return Vec::new();
+    }
+    let steps = found.steps.par_iter().rev();
+    steps.map(|step| step_picture(assembly, step)).collect()
 }
 
 /// The parts that are on before a step, and the group beside its place with its way in.

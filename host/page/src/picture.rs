@@ -43,6 +43,22 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
+impl Picture {
+    /// The picture at half its size, each pixel the mean of four. A last row or column of an odd size is left out.
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let mut rgb = Vec::with_capacity(3 * width * height);
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            for c in 0..3 {
+                let four = [(0, 0), (0, 1), (1, 0), (1, 1)]
+                    .map(|(j, i)| u32::from(self.rgb[3 * ((2 * y + j) * self.width + 2 * x + i) + c]));
+                rgb.push(((four.iter().sum::<u32>() + 2) / 4) as u8);
+            }
+        }
+        Self { width, height, rgb }
+    }
+}
+
 /// Draws parts and a line along `way`. All of them fit into the picture.
 ///
 /// Cost: each triangle's pixels; some milliseconds for 10,000 triangles.
@@ -285,6 +301,26 @@ mod tests {
         }
         let hidden = picture(&[below, at(-1.0)], &[], [200, 150]);
         assert_eq!(count(&hidden, is_red), 0);
+    }
+
+    /// Half of it has the same mean, also of an odd size, and nothing stays of a single pixel.
+    #[test]
+    fn half_of_a_picture_has_its_mean() {
+        let shape = plate(10.0);
+        let part = Drawn {
+            shape: &shape,
+            pose: DAffine3::IDENTITY,
+            color: RED,
+        };
+        let mean = |p: &Picture| p.rgb.iter().map(|v| f64::from(*v)).sum::<f64>() / p.rgb.len() as f64;
+        let whole = picture(&[part], &[], [120, 90]);
+        let half = whole.halved();
+        assert_eq!([half.width, half.height], [60, 45]);
+        assert_eq!(half.rgb.len(), 3 * 60 * 45);
+        assert!((mean(&half) - mean(&whole)).abs() < 0.5, "rounding of a byte");
+        let odd = half.halved();
+        assert_eq!([odd.width, odd.height, odd.rgb.len()], [30, 22, 3 * 30 * 22]);
+        assert!(picture(&[part], &[], [1, 1]).halved().rgb.is_empty());
     }
 
     /// Nothing, points at one place and values that are no numbers are drawn without a fault.

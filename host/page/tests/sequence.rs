@@ -6,7 +6,6 @@ use std::time::Duration;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use mortise_brep::load_step;
-use mortise_page::page;
 use mortise_task::{Assembly, sequence};
 
 fn taken_apart(file: &str, rename: &str) -> (Assembly, sequence::Sequence) {
@@ -17,6 +16,12 @@ fn taken_apart(file: &str, rename: &str) -> (Assembly, sequence::Sequence) {
     let all: Vec<usize> = (0..assembly.count()).collect();
     let found = sequence::disassemble(&assembly, &all, Duration::from_secs(60));
     (assembly, found)
+}
+
+/// The page of a sequence, with its pictures.
+fn page(title: &str, assembly: &Assembly, found: &sequence::Sequence, felt: &[String]) -> String {
+    let pictures = mortise_page::pictures(assembly, found);
+    mortise_page::page(title, assembly, found, &pictures, felt)
 }
 
 /// Pixels of the pictures of a page.
@@ -51,6 +56,8 @@ fn each_step_has_its_picture_and_its_row() {
     // Nothing is fetched.
     assert!(!page.contains("http") && !page.contains("<script") && !page.contains("<link"));
     let pictures = pictures(&page);
+    let drawn = mortise_page::pictures(&assembly, &found);
+    assert!(pictures.iter().eq(drawn.iter().map(|picture| &picture.rgb)));
     assert_eq!(pictures.len(), count);
     let orange = |p: &[u8]| i32::from(p[0]) - i32::from(p[2]) > 90;
     for picture in &pictures {

@@ -207,7 +207,9 @@ pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
         let name = args.search.source.file.file_stem();
         let title = name.map_or("assembly".into(), |name| name.to_string_lossy());
         let felt = played.as_ref().map_or(&[][..], Played::felt);
-        output.write(mortise_page::page(&title, &assembly, &found, felt).as_bytes())?;
+        let pictures = mortise_page::pictures(&assembly, &found);
+        let page = mortise_page::page(&title, &assembly, &found, &pictures, felt);
+        output.write(page.as_bytes())?;
     }
     if let Some(played) = played {
         if report.verdict != "assembles" || !played.all_in() {

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
+use mortise_page::Picture;
 use mortise_task::report::{self, Sense};
 use mortise_task::sequence::Sequence as Found;
 use mortise_task::{Assembly, Motion};
@@ -18,6 +19,8 @@ const ARM: f64 = 0.5;
 const SAME_MM: f64 = 1e-3;
 /// See [`Sequence::done`].
 const MOST: usize = 1000;
+/// Lines of a way that is drawn: a turn by half a circle leaves its arc by 0.1 % of the radius.
+const LINES: u32 = 36;
 
 /// A step: a group of parts is put onto others.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,12 +29,21 @@ pub struct Step {
     pub parts: Vec<usize>,
     /// Their names.
     pub names: String,
-    /// First direction of the way out, in words.
-    pub side: String,
     /// The step in words.
     pub words: String,
+    /// The parts that are on before the step, and those that move with their way in; `None` where an assembly has too many steps.
+    pub picture: Option<Arc<Picture>>,
+    /// Middle of the parts where the file has them.
+    middle: DVec3,
     /// Way from the place of the parts outwards, to where they stand before the step.
     way: Vec<Motion>,
+}
+
+impl Step {
+    /// The step in words, without what moves.
+    pub fn how(&self) -> &str {
+        (self.words.strip_prefix(&self.names)).map_or(&self.words, str::trim_start)
+    }
 }
 
 /// The steps of an assembly.
@@ -59,6 +71,7 @@ impl Sequence {
         let (low, high) = assembly.bounds_of(&all, DAffine3::IDENTITY);
         let radius = (0.5 * low.distance(high)).max(1e-3);
         let count = report.steps.len();
+        let pictures = mortise_page::pictures(assembly, found);
         // What each part has been moved by so far, from where the file has it.
         let (mut by, mut steps) = (vec![DAffine3::IDENTITY; all.len()], Vec::with_capacity(count));
         for (step, words) in found.steps.iter().rev().zip(&report.steps) {
@@ -80,10 +93,13 @@ impl Sequence {
                     by[*part].translation += beyond;
                 }
             }
+            let (low, high) = assembly.bounds_of(&step.group, DAffine3::IDENTITY);
+            let picture = pictures.get(steps.len());
             steps.push(Step {
+                picture: picture.map(|picture| Arc::new(picture.halved())),
+                middle: 0.5 * (low + high),
                 parts: step.group.clone(),
                 names: words.moving.join(", "),
-                side: words.way(),
                 words: words.words(),
                 way,
             });
@@ -98,7 +114,7 @@ impl Sequence {
             steps,
             verdict,
             stuck: report.stuck.iter().map(|stuck| stuck.words()).collect(),
-            page: mortise_page::page(title, assembly, found, &[]).into(),
+            page: mortise_page::page(title, assembly, found, &pictures, &[]).into(),
             file: all.iter().map(|part| assembly.placement(*part)).collect(),
             radius,
         }
@@ -150,6 +166,26 @@ impl Sequence {
     /// The step that is next, or under way, after `done` steps.
     pub fn next(&self, done: f64) -> Option<&Step> {
         self.steps.get(done.max(0.0) as usize)
+    }
+
+    /// Way of the middle of the parts that the next step puts on, from where they stand before it to their place, mm; empty after the last step.
+    pub fn way(&self, done: f64) -> Vec<DVec3> {
+        let number = done.max(0.0) as usize;
+        let Some(step) = self.steps.get(number) else {
+            return Vec::new();
+        };
+        // What is put on as one later stands apart until then.
+        let later = (self.steps[number + 1..].iter())
+            .filter(|later| step.parts.iter().all(|part| later.parts.contains(part)))
+            .fold(DAffine3::IDENTITY, |by, later| {
+                along(&later.way, 1.0, ARM * self.radius) * by
+            });
+        let at = |line: u32| {
+            let out = 1.0 - f64::from(line) / f64::from(LINES);
+            let by = later * along(&step.way, out, ARM * self.radius);
+            by.transform_point3(step.middle)
+        };
+        (0..=LINES).map(at).collect()
     }
 }
 
@@ -232,6 +268,14 @@ mod tests {
         (assembly, sequence)
     }
 
+    /// A file of the repository.
+    fn of_file(file: &str) -> (Assembly, Sequence) {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("..")
+            .join(file);
+        taken_apart(mortise_brep::load_step(&file).expect("a file of the repository"))
+    }
+
     fn sample() -> (Assembly, Sequence) {
         let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
         taken_apart((*document.model).clone())
@@ -257,6 +301,32 @@ mod tests {
         let half = sequence.poses(0.5)[moved].translation - file[moved].translation;
         assert!((half - 0.5 * way).length() < 1e-9);
         assert_eq!(sequence.next(1.0), None);
+        let picture = sequence.next(0.0).and_then(|step| step.picture.as_ref());
+        let picture = picture.expect("a picture");
+        let how = sequence.next(0.0).map(Step::how).unwrap_or_default();
+        assert!(how.starts_with("along ") && how.contains(": clear"), "{how}");
+        assert_eq!([picture.width, picture.height], [190, 140]);
+    }
+
+    /// The way that is drawn of a step is where its parts go, from their place before the step to that after it.
+    #[test]
+    fn the_way_of_a_step_is_where_its_parts_go() {
+        let (assembly, row) = of_file("lab/data/fixture_row.step");
+        let (pair, sample) = sample();
+        for (assembly, sequence) in [(assembly, row), (pair, sample)] {
+            for (number, step) in sequence.steps.iter().enumerate() {
+                let way = sequence.way(number as f64);
+                let (low, high) = assembly.bounds_of(&step.parts, DAffine3::IDENTITY);
+                for (line, point) in way.iter().enumerate() {
+                    let done = number as f64 + line as f64 / f64::from(LINES);
+                    let poses = sequence.poses(done);
+                    let by = poses[step.parts[0]] * sequence.file[step.parts[0]].inverse();
+                    let middle = by.transform_point3(0.5 * (low + high));
+                    assert!(middle.distance(*point) < 1e-9, "{done}: {middle} {point}");
+                }
+            }
+            assert!(sequence.way(sequence.steps.len() as f64).is_empty());
+        }
     }
 
     /// Of files with several parts: no two are nearer than their boxes are to be once all are off, and each step is clear of those that follow.
@@ -266,11 +336,7 @@ mod tests {
             "lab/data/fixture_row.step",
             "mating/tests/data/two_pin_exact.step",
         ] {
-            let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join("..")
-                .join(file);
-            let model = mortise_brep::load_step(&file).expect("a file of the repository");
-            let (assembly, sequence) = taken_apart(model);
+            let (assembly, sequence) = of_file(file);
             let count = assembly.count();
             assert_eq!(sequence.steps.len(), count - 1, "{}", sequence.verdict);
             let apart = sequence.poses(0.0);
@@ -279,13 +345,7 @@ mod tests {
                 .collect();
             for (a, b) in (0..count).flat_map(|a| (0..a).map(move |b| (a, b))) {
                 let near = overlap(&boxes[a], &boxes[b], 0.999 * BETWEEN * sequence.radius);
-                assert!(
-                    !near,
-                    "{} and {} of {}",
-                    assembly.name(a),
-                    assembly.name(b),
-                    file.display()
-                );
+                assert!(!near, "{} and {} of {}", assembly.name(a), assembly.name(b), file);
             }
         }
     }

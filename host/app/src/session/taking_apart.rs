@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use glam::{DAffine3, DVec3};
 use mortise_brep::CadModel;
 use mortise_task::{Assembly, Deadline, sequence};
 
@@ -20,6 +21,27 @@ const LONGEST: Duration = Duration::from_secs(60);
 const NAME: &str = "go to a step of the sequence";
 
 impl Session {
+    /// Way of what the next step puts on, from where it stands to its place, mm; `None` where the parts are at no step, or all are in place.
+    pub fn next_way(&self) -> Option<Vec<DVec3>> {
+        let found = self.sequencing.found(self.document.as_ref()?)?;
+        let way = found.way(self.sequencing.done()?);
+        (!way.is_empty()).then_some(way)
+    }
+
+    /// Parts that the next step puts on, with their poses after it; none where the parts are at no step, or all are in place.
+    pub fn next_places(&self) -> Vec<(usize, DAffine3)> {
+        let next = || {
+            let found = self.sequencing.found(self.document.as_ref()?)?;
+            let done = self.sequencing.done()?;
+            Some((found.next(done)?, found.poses(done.floor() + 1.0)))
+        };
+        let Some((step, poses)) = next() else {
+            return Vec::new();
+        };
+        let place = |&part: &usize| Some((part, *poses.get(part)?));
+        step.parts.iter().filter_map(place).collect()
+    }
+
     /// Starts the search, which must be possible.
     pub(super) fn find_sequence(&mut self) {
         let Some(document) = &self.document else { return };

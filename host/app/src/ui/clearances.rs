@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{Button, CollapsingHeader, DragValue, RichText, ScrollArea, Ui};
+use egui::{Button, DragValue, RichText, ScrollArea, Ui};
 
 use super::{control, theme};
 use crate::session::Session;
@@ -18,8 +18,6 @@ pub struct Clearances {
     search: Search,
     /// Largest gap searched for, µm.
     within_um: f64,
-    /// Height of the list in the last frame, points.
-    pub height: f32,
 }
 
 impl Default for Clearances {
@@ -27,7 +25,6 @@ impl Default for Clearances {
         Self {
             search: Search::default(),
             within_um: 1000.0,
-            height: 0.0,
         }
     }
 }
@@ -42,12 +39,7 @@ impl Clearances {
     pub fn show(&mut self, ui: &mut Ui, session: &Session, view: &mut Viewpoint) {
         ui.take_available_width();
         let Some(document) = &session.document else { return };
-        let heading = RichText::new("Clearances")
-            .size(12.5)
-            .color(theme::of(ui).text_weak);
-        CollapsingHeader::new(heading)
-            .default_open(false)
-            .show(ui, |ui| self.list(ui, document, view));
+        control::folded(ui, "Clearances", |ui| self.list(ui, document, view));
     }
 
     fn list(&mut self, ui: &mut Ui, document: &Document, view: &mut Viewpoint) {

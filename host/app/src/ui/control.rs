@@ -2,8 +2,8 @@
 
 use egui::text::{LayoutJob, TextWrapping};
 use egui::{
-    Align2, Button, Color32, CornerRadius, FontId, Pos2, Response, RichText, Role, Sense, Stroke, TextFormat,
-    Ui, Vec2, WidgetInfo,
+    Align2, Button, CollapsingHeader, Color32, CornerRadius, FontId, Pos2, Response, RichText, Role, Sense,
+    Stroke, TextFormat, Ui, Vec2, WidgetInfo,
 };
 
 use super::theme;
@@ -134,6 +134,25 @@ pub fn section(ui: &mut Ui, text: &str) {
             .color(theme::of(ui).text_weak)
             .strong(),
     );
+}
+
+/// A section that is folded until it is opened, under a low heading; `None` while it is folded.
+pub fn folded<R>(ui: &mut Ui, title: &str, body: impl FnOnce(&mut Ui) -> R) -> Option<R> {
+    let heading = RichText::new(title).size(12.5).color(theme::of(ui).text_weak);
+    let usual = ui.ctx().global_style().spacing.clone();
+    ui.scope(|ui| {
+        ui.spacing_mut().interact_size.y = 20.0;
+        ui.spacing_mut().button_padding.y = 3.0;
+        let contents = |ui: &mut Ui| {
+            *ui.spacing_mut() = usual;
+            body(ui)
+        };
+        CollapsingHeader::new(heading)
+            .default_open(false)
+            .show(ui, contents)
+            .body_returned
+    })
+    .inner
 }
 
 /// A line between sections, with space around it.

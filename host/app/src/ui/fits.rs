@@ -5,7 +5,7 @@ use std::time::Duration;
 use egui::text::LayoutJob;
 use egui::{Align2, FontId, Pos2, Rect, RichText, ScrollArea, Stroke, TextFormat, Ui, UiBuilder, Vec2};
 
-use super::{control, theme};
+use super::{control, theme, way};
 use crate::session::document::Document;
 use crate::session::fitting::{Fitting, Offer, Search, is_closed};
 use crate::session::{Intent, Session};
@@ -236,7 +236,7 @@ pub fn over_view(ui: &mut Ui, rect: Rect, top: f32, session: &Session, view: &mu
         return top;
     };
     let Some(offer) = fitting.offer() else { return top };
-    way(ui, rect, document, fitting, offer, view);
+    draw_way(ui, rect, document, fitting, offer, view);
     let place = Rect::from_min_size(
         Pos2::new(rect.left() + 14.0, top + 8.0),
         Vec2::new((rect.width() - 28.0).max(10.0), 20.0),
@@ -265,31 +265,19 @@ pub fn over_view(ui: &mut Ui, rect: Rect, top: f32, session: &Session, view: &mu
 }
 
 /// The way in as a line with an arrowhead at the place, and a thin line from where the part is to its beginning.
-fn way(ui: &Ui, rect: Rect, document: &Document, fitting: &Fitting, offer: &Offer, view: &Viewpoint) {
+fn draw_way(ui: &Ui, rect: Rect, document: &Document, fitting: &Fitting, offer: &Offer, view: &Viewpoint) {
     let points = offer.way(document, fitting.moving);
-    let seen: Option<Vec<Pos2>> = (points.iter())
-        .map(|&point| on_screen(&view.camera, rect, point))
-        .collect();
-    // A point behind the eye has no place in the picture.
-    let Some(seen) = seen.filter(|seen| seen.len() > 1) else {
+    let Some(seen) = way::seen(&points, rect, view) else {
         return;
     };
     let painter = ui.painter_at(rect);
-    let color = theme::of(ui).mates;
-    let (first, last) = (seen[0], seen[seen.len() - 1]);
+    let (color, first) = (theme::of(ui).mates, seen[0]);
     let here = fitting.middle(document);
     if let Some(here) = here.and_then(|here| on_screen(&view.camera, rect, here)) {
         let thin = Stroke::new(1.2, color.gamma_multiply(0.8));
         painter.extend(egui::Shape::dashed_line(&[here, first], thin, 5.0, 4.0));
     }
-    painter.add(egui::Shape::line(seen.clone(), Stroke::new(2.4, color)));
-    let before = seen.iter().rev().find(|point| point.distance(last) > 8.0);
-    if let Some(before) = before {
-        let along = (last - *before).normalized() * 11.0;
-        let side = Vec2::new(-along.y, along.x) * 0.45;
-        let head = vec![last, last - along + side, last - along - side];
-        painter.add(egui::Shape::convex_polygon(head, color, Stroke::NONE));
-    }
+    way::draw(&painter, &seen, 2.4, color);
     painter.text(
         first,
         Align2::LEFT_BOTTOM,

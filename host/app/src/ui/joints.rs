@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use egui::{Button, CollapsingHeader, RichText, ScrollArea, Ui};
+use egui::{Button, RichText, ScrollArea, Ui};
 
 use super::{control, theme};
 use crate::session::document::Document;
@@ -19,18 +19,15 @@ const TICK: Duration = Duration::from_millis(500);
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     ui.take_available_width();
     let Some(document) = &session.document else { return };
-    let heading = RichText::new("Joints").size(12.5).color(theme::of(ui).text_weak);
-    let drawn = CollapsingHeader::new(heading)
-        .default_open(false)
-        .show(ui, |ui| match session.selected {
-            Some(part) => contents(ui, session, document, part, wanted),
-            None => {
-                ui.label(RichText::new("Select a part").color(theme::of(ui).text_weak));
-                None
-            }
-        });
+    let drawn = control::folded(ui, "Joints", |ui| match session.selected {
+        Some(part) => contents(ui, session, document, part, wanted),
+        None => {
+            ui.label(RichText::new("Select a part").color(theme::of(ui).text_weak));
+            None
+        }
+    });
     // The pointer has left, or the list is folded.
-    let over = drawn.body_returned.flatten();
+    let over = drawn.flatten();
     if over != session.joints.marked() {
         wanted.push(Intent::Joint(JointIntent::Mark(over)));
         ui.ctx().request_repaint();

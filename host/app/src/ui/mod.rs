@@ -4,6 +4,7 @@ pub mod app;
 #[cfg(target_os = "linux")]
 mod appearance;
 mod arrange;
+mod below;
 mod cards;
 mod clearances;
 mod command;
@@ -14,6 +15,7 @@ mod description;
 mod drop;
 mod eye;
 mod file_menu;
+mod filmstrip;
 mod firmware;
 mod fits;
 pub mod fonts;
@@ -44,6 +46,7 @@ mod stop;
 pub mod theme;
 mod undo;
 mod view;
+mod way;
 
 use std::time::{Duration, Instant};
 
@@ -80,7 +83,7 @@ pub struct Window {
     search: String,
     /// What the plots show.
     pub plots: plots::View,
-    clearances: clearances::Clearances,
+    below: below::Below,
     command: command::CommandLine,
     motion: motion::Fields,
     help: keys::Help,
@@ -103,7 +106,7 @@ impl Window {
             tab: arrange::Tab::default(),
             search: String::new(),
             plots,
-            clearances: clearances::Clearances::default(),
+            below: below::Below::default(),
             command: command::CommandLine::default(),
             motion: motion::Fields::default(),
             help: keys::Help::default(),
@@ -116,7 +119,7 @@ impl Window {
     pub fn show(&mut self, ui: &mut Ui, surface: Option<&mut Surface>) {
         self.session.poll();
         self.view.begin();
-        self.clearances.poll();
+        self.below.poll();
         if self.session.play(Instant::now()) {
             ui.ctx().request_repaint();
         }
@@ -252,7 +255,7 @@ impl Window {
             .size_range(180.0..=420.0)
             .frame(theme::panel(theme::of(ui)))
             .show(ui, |ui| {
-                below(ui, &mut self.clearances, session, &mut self.view, wanted);
+                self.below.show(ui, session, &mut self.view, wanted);
                 egui::CentralPanel::default()
                     .frame(egui::Frame::NONE)
                     .show(ui, |ui| {
@@ -310,7 +313,7 @@ impl Window {
             arrange::Tab::View => {}
             arrange::Tab::Rig => rig::show(ui, session, wanted),
             arrange::Tab::Parts => {
-                below(ui, &mut self.clearances, session, &mut self.view, wanted);
+                self.below.show(ui, session, &mut self.view, wanted);
                 parts::show(
                     ui,
                     session,
@@ -343,25 +346,6 @@ impl Window {
                 cards::show(ui, rect, session, wanted);
             });
     }
-}
-
-/// Draws joints, the sequence and the list of clearances at the lower end of the panel of parts.
-fn below(
-    ui: &mut Ui,
-    list: &mut clearances::Clearances,
-    session: &Session,
-    view: &mut Viewpoint,
-    wanted: &mut Vec<Intent>,
-) {
-    let drawn = egui::Panel::bottom("clearances")
-        .resizable(false)
-        .frame(egui::Frame::NONE)
-        .show(ui, |ui| {
-            joints::show(ui, session, wanted);
-            sequence::show(ui, session, view, wanted);
-            list.show(ui, session, view);
-        });
-    control::settle(ui, drawn.response.rect.height(), &mut list.height);
 }
 
 fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {

@@ -1,35 +1,41 @@
 //! The steps in which the assembly goes together, under the parts, folded until they are opened: searched on request; a slider takes the parts apart and puts
-//! them together, a click on a step goes to where it begins.
+//! them together, a strip of pictures shows the steps.
 
 use std::time::Duration;
 
-use egui::{Button, CollapsingHeader, Label, RichText, ScrollArea, Slider, Ui};
+use egui::{Button, Label, RichText, Slider, Ui};
 
+use super::filmstrip::Filmstrip;
 use super::{control, theme};
 use crate::session::sequence::Sequence;
 use crate::session::{Intent, Session, obstacle};
 use crate::viewport::gesture::Viewpoint;
 
-/// Largest height of the list, points.
-const LIST_HEIGHT: f32 = 150.0;
 /// Time between two pictures of a search, which shows the time passed.
 const TICK: Duration = Duration::from_millis(500);
 
 /// Draws the section.
-pub fn show(ui: &mut Ui, session: &Session, view: &mut Viewpoint, wanted: &mut Vec<Intent>) {
+pub fn show(
+    ui: &mut Ui,
+    strip: &mut Filmstrip,
+    session: &Session,
+    view: &mut Viewpoint,
+    wanted: &mut Vec<Intent>,
+) {
     ui.take_available_width();
     if session.document.is_none() {
         return;
     }
-    let heading = RichText::new("Sequence")
-        .size(12.5)
-        .color(theme::of(ui).text_weak);
-    CollapsingHeader::new(heading)
-        .default_open(false)
-        .show(ui, |ui| contents(ui, session, view, wanted));
+    control::folded(ui, "Sequence", |ui| contents(ui, strip, session, view, wanted));
 }
 
-fn contents(ui: &mut Ui, session: &Session, view: &mut Viewpoint, wanted: &mut Vec<Intent>) {
+fn contents(
+    ui: &mut Ui,
+    strip: &mut Filmstrip,
+    session: &Session,
+    view: &mut Viewpoint,
+    wanted: &mut Vec<Intent>,
+) {
     let Some(document) = &session.document else { return };
     request(ui, session, wanted);
     if let Some(why) = session.sequencing.failure(document) {
@@ -47,7 +53,7 @@ fn contents(ui: &mut Ui, session: &Session, view: &mut Viewpoint, wanted: &mut V
     }
     let done = session.sequencing.done();
     slide(ui, session, found, done, view, wanted);
-    list(ui, session, found, done, wanted);
+    strip.show(ui, session, found, done, wanted);
 }
 
 fn request(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
@@ -130,37 +136,4 @@ fn slide(
         None => "Parts have been moved otherwise".to_owned(),
     };
     ui.label(RichText::new(text).size(12.0).color(theme::of(ui).text_weak));
-}
-
-fn list(ui: &mut Ui, session: &Session, found: &Sequence, done: Option<f64>, wanted: &mut Vec<Intent>) {
-    let next = done.map(|done| done as usize);
-    ScrollArea::vertical()
-        .id_salt("sequence")
-        .auto_shrink([false, true])
-        .max_height(LIST_HEIGHT)
-        .min_scrolled_height(LIST_HEIGHT)
-        .show(ui, |ui| {
-            ui.spacing_mut().item_spacing.y = 2.0;
-            for (i, step) in found.steps.iter().enumerate() {
-                let number = i + 1;
-                let named = format!("{number}. {}", step.words);
-                let line = control::Line {
-                    left: format!("{number}. {}", step.names),
-                    right: step.side.clone(),
-                    color: theme::of(ui).text,
-                    hint: format!("{named}; a click goes to where this step begins"),
-                    named,
-                    chosen: next == Some(i),
-                };
-                if line.show(ui) {
-                    let intent = Intent::GoToStep {
-                        done: i as f64,
-                        goes_on: false,
-                    };
-                    if obstacle(session, &intent).is_none() {
-                        wanted.push(intent);
-                    }
-                }
-            }
-        });
 }

@@ -7,7 +7,7 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, cube, fits, gaps, handles, measure, section, theme};
+use super::{control, cube, fits, gaps, handles, measure, section, theme, way};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
@@ -65,6 +65,7 @@ pub fn show(
         }
     }
     touching(ui, rect, session, view);
+    way::of_next_step(ui, rect, session, view);
     gaps::show(ui, rect, document, view);
     marked(ui, rect, view);
     if !view.measure.on {

@@ -108,22 +108,21 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
             }
         })
         .collect();
-    if let Some((part, pose)) = session.ghost()
-        && apart(&pose, &document.poses[part], document, part) > GHOST_FROM * document.extent.radius
-    {
-        items.push(Item {
-            shape: document.model.parts[part].shape,
-            pose,
-            color: GHOST,
-            opacity: 0.16,
-            tint: [0.0; 4],
-            line: [GHOST[0], GHOST[1], GHOST[2], 0.55],
-            lit: Vec::new(),
-            lit_edges: Vec::new(),
-            mates: Vec::new(),
-        });
+    items.extend(
+        session
+            .ghost()
+            .and_then(|(part, pose)| ghost(document, part, pose)),
+    );
+    match fit {
+        Some((part, offer)) => items.extend(fit_ghost(document, part, offer)),
+        None => {
+            let next = session.next_places();
+            items.extend(
+                next.into_iter()
+                    .filter_map(|(part, pose)| ghost(document, part, pose)),
+            );
+        }
     }
-    items.extend(fit.and_then(|(part, offer)| fit_ghost(document, part, offer)));
     let cut = look.cut.map(|shown| Cutaway {
         plane: shown.plane,
         areas: shown.cut.map(|cut| Areas(cut.clone())),
@@ -210,6 +209,25 @@ fn lit_edges(document: &Document, telemetry: &Telemetry, part: usize, in_hand: b
         }
     }
     edges
+}
+
+/// The ghost of a part elsewhere; `None` where the part is there.
+fn ghost(document: &Document, part: usize, pose: DAffine3) -> Option<Item> {
+    let here = document.poses.get(part)?;
+    if apart(&pose, here, document, part) <= GHOST_FROM * document.extent.radius {
+        return None;
+    }
+    Some(Item {
+        shape: document.model.parts[part].shape,
+        pose,
+        color: GHOST,
+        opacity: 0.16,
+        tint: [0.0; 4],
+        line: [GHOST[0], GHOST[1], GHOST[2], 0.55],
+        lit: Vec::new(),
+        lit_edges: Vec::new(),
+        mates: Vec::new(),
+    })
 }
 
 /// The ghost of a part in a fit, its mating faces marked; `None` where the part is there.

@@ -1,11 +1,16 @@
 //! The steps in which an assembly goes together, in the running window.
 
-use crate::common::{arm, click, connect, harness, open_sample, poses, until};
+use std::path::Path;
+
+use crate::common::{arm, click, connect, harness, open_sample, picture, poses, until};
+use egui::accesskit::Toggled;
+use egui::epaint::ColorMode;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use mortise::session::{Intent, obstacle};
-use mortise::ui::Window;
+use mortise::session::sequence::Sequence;
+use mortise::session::{Intent, Session, obstacle};
+use mortise::ui::{Window, theme};
 
 /// The sample, with its steps found.
 fn found() -> Harness<'static, Window> {
@@ -110,6 +115,133 @@ fn a_hand_takes_a_part_from_where_a_step_has_it_and_no_step_moves_what_it_holds(
     assert!(off(&document.poses, &apart) < 1e-3, "where the board has them");
     assert!(harness.get_by_label("Together").accesskit_node().is_disabled());
     assert!(harness.get_by_label("Steps done").accesskit_node().is_disabled());
+}
+
+/// A row of pins in a plate, with its steps found.
+fn found_row() -> Harness<'static, Window> {
+    let mut harness = harness();
+    harness.step();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../lab/data/fixture_row.step");
+    harness.state_mut().session.act(Intent::Open(file));
+    until(&mut harness, "it is baked", |session| {
+        (session.document.as_ref()).is_some_and(|document| document.baked.is_some())
+    });
+    click(&mut harness, "Sequence");
+    harness.state_mut().session.act(Intent::FindSequence);
+    until(&mut harness, "the steps are found", |session| {
+        steps(session).is_some()
+    });
+    harness.run_steps(20);
+    harness
+}
+
+fn steps(session: &Session) -> Option<&Sequence> {
+    session.sequencing.found(session.document.as_ref()?)
+}
+
+/// Number of pictures of steps on the graphics card.
+fn pictures(harness: &Harness<'_, Window>) -> usize {
+    let textures = harness.ctx.tex_manager();
+    let textures = textures.read();
+    let of_steps = textures
+        .allocated()
+        .filter(|(_, meta)| meta.name.starts_with("step "));
+    of_steps.count()
+}
+
+#[test]
+fn each_step_is_a_picture_and_a_click_goes_to_where_it_begins() {
+    let mut harness = found_row();
+    let found = steps(&harness.state().session).expect("found").clone();
+    assert!(found.steps.len() >= 3);
+    assert!(found.steps.iter().all(|step| step.picture.is_some()));
+    // They are sent to the graphics card when they are seen, and once.
+    let seen = pictures(&harness);
+    assert!(seen >= 2, "{seen}");
+    for _ in 0..5 {
+        harness.step();
+        let sent = &harness.output().textures_delta.set;
+        let mut sent = sent.values().flatten();
+        assert!(sent.all(|delta| delta.image.size() != [190, 140]));
+    }
+    assert_eq!(pictures(&harness), seen);
+    // Whichever is clicked, its parts are apart, those before it in place, and it is marked as the next one.
+    for number in [1, 0, found.steps.len() - 1] {
+        let row = |number: usize| format!("{}. {}", number + 1, found.steps[number].words);
+        // Also one that is scrolled out of sight.
+        harness.get_by_label(&row(number)).click_accesskit();
+        harness.run_steps(10);
+        assert_eq!(poses(&harness), found.poses(number as f64));
+        for other in 0..found.steps.len() {
+            let name = row(other);
+            let row = harness.get_by_label(&name);
+            assert_eq!(
+                row.accesskit_node().toggled() == Some(Toggled::True),
+                other == number
+            );
+        }
+    }
+    // The next step is kept in sight.
+    let list = harness.get_by_label("Steps done").rect().bottom();
+    let last = format!(
+        "{}. {}",
+        found.steps.len(),
+        found.steps[found.steps.len() - 1].words
+    );
+    let row = harness.get_by_label(&last).rect();
+    assert!(
+        row.top() > list && row.bottom() < list + 260.0,
+        "{row:?} below {list}"
+    );
+    // Another search has other pictures, and those before are given back.
+    harness.state_mut().session.act(Intent::FindSequence);
+    harness.run_steps(3);
+    until(&mut harness, "the steps are found", |session| {
+        steps(session).is_some()
+    });
+    harness.run_steps(5);
+    assert!(pictures(&harness) <= found.steps.len());
+}
+
+/// Points of the line of a way over the view.
+fn ways(harness: &Harness<'_, Window>) -> Vec<usize> {
+    let accent = theme::palette(egui::Theme::Dark).accent;
+    let shapes = harness.output().shapes.iter();
+    shapes
+        .filter_map(|clipped| match &clipped.shape {
+            egui::Shape::Path(path) if path.stroke.color == ColorMode::Solid(accent) && !path.closed => {
+                Some(path.points.len())
+            }
+            _ => None,
+        })
+        .filter(|points| *points > 10)
+        .collect()
+}
+
+#[test]
+fn the_way_of_the_next_step_and_its_place_are_drawn_in_the_view() {
+    let mut harness = found_row();
+    let count = poses(&harness).len();
+    assert!(ways(&harness).is_empty(), "all parts are in place");
+    assert_eq!(picture(&harness).len(), count);
+    let found = steps(&harness.state().session).expect("found").clone();
+    for number in 0..found.steps.len() {
+        harness.state_mut().session.act(Intent::GoToStep {
+            done: number as f64,
+            goes_on: false,
+        });
+        harness.run_steps(3);
+        assert_eq!(ways(&harness).len(), 1, "step {number}");
+        let moving = &found.steps[number].parts;
+        let after = found.poses(number as f64 + 1.0);
+        let drawn = picture(&harness);
+        let ghosts: Vec<_> = drawn[count..].iter().map(|item| item.pose).collect();
+        let places: Vec<_> = moving.iter().map(|part| after[*part]).collect();
+        assert_eq!(ghosts, places);
+    }
+    click(&mut harness, "Together");
+    harness.run_steps(3);
+    assert!(ways(&harness).is_empty());
 }
 
 /// *Report…* asks for a file and writes the order with a picture of each step; before the steps are found it says what is missing.
