@@ -12,6 +12,7 @@ use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 
+use super::find_connections::ConnectionsIntent;
 use super::finding::NO_FIT;
 use super::flashing::FlashIntent;
 use super::joints::JointIntent;
@@ -173,6 +174,8 @@ pub enum Intent {
     Flash(FlashIntent),
     /// An action on the joints of a part.
     Joint(JointIntent),
+    /// An action on the connections of the parts.
+    Connections(ConnectionsIntent),
     /// Let the simulated hand insert the peg into the hole.
     PlayInsertion,
     /// Run everything from the sample to the insertion automatically. `None`: the emulated board if it is available, else in-process.
@@ -216,6 +219,7 @@ impl Intent {
                 | Self::EndRecording
                 | Self::Run(_)
                 | Self::Joint(_)
+                | Self::Connections(_)
                 | Self::Rig(RigIntent::Show(_))
                 | Self::Demo(_)
         )
@@ -373,6 +377,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Rig(intent) => session.no_rig_action(intent),
         Intent::Flash(intent) => session.no_flashing(intent),
         Intent::Joint(intent) => session.no_joint_action(intent),
+        Intent::Connections(intent) => session.no_connections_action(*intent),
         Intent::PlayInsertion => play(session),
     }
 }

@@ -11,6 +11,7 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_protocol::rig::Rig;
 use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 
+use super::connections::ConnectionsFound;
 use super::document::Document;
 use super::fitting::FitsFound;
 use super::flashing::FlashUpdate;
@@ -98,6 +99,8 @@ pub enum Update {
     },
     /// The joints of a part were searched.
     Joints(JointsFound),
+    /// The connections of the parts were searched.
+    Connections(ConnectionsFound),
     /// Firmware is being written to a board.
     Flashing(FlashUpdate),
     /// Reading a recorded run ended.

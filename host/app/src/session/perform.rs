@@ -130,6 +130,7 @@ impl Session {
             Intent::Rig(intent) => self.perform_on_rig(intent),
             Intent::Flash(intent) => self.perform_flashing(intent),
             Intent::Joint(intent) => self.perform_on_joints(intent),
+            Intent::Connections(intent) => self.perform_on_connections(intent),
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
             Intent::Demo(rig) => self.demo(rig),
         }

@@ -15,6 +15,7 @@ use mortise_protocol::message::{DeviceState, Telemetry};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{RigEntry, RigSpec};
 
+use super::connections::Connections;
 use super::document::Document;
 use super::fits::FitChoice;
 use super::fitting::Fitting;
@@ -126,6 +127,8 @@ pub struct Session {
     pub flashing: Flashing,
     /// Joints of a part.
     pub joints: Joints,
+    /// Connections of the parts.
+    pub connections: Connections,
     /// Messages.
     pub notes: Notes,
     /// Contact method of the next bake.
@@ -198,6 +201,7 @@ impl Session {
             rig_page: RigPage::default(),
             flashing: Flashing::default(),
             joints: Joints::default(),
+            connections: Connections::default(),
             playback: None,
             before_run: None,
             played: None,

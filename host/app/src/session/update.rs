@@ -92,6 +92,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         Update::Run(read) => session.run_read(read),
         Update::Flashing(update) => session.flashed(update),
         Update::Joints(found) => session.joints.take_in(found),
+        Update::Connections(found) => session.connections.take_in(found),
         Update::Written(Ok(done)) => session.notes.add(Severity::Good, done),
         Update::Written(Err(why)) => session.notes.add(Severity::Error, why),
     }
@@ -125,6 +126,7 @@ fn opened(session: &mut Session, Imported { document, saved }: Imported) {
     session.playback = None;
     session.before_run = None;
     session.sequencing.cancel();
+    session.connections.cancel();
     session.ways.clear();
     session.partner = None;
     session.verdict = None;

@@ -1,8 +1,9 @@
-//! What is at the lower end of the panel of parts, each folded until it is opened: joints, the sequence, and clearances.
+//! What is at the lower end of the panel of parts, each folded until it is opened: joints, connections, the sequence, and clearances.
 
 use egui::{Frame, Panel, ScrollArea, Ui};
 
 use super::clearances::Clearances;
+use super::connections::Connections;
 use super::filmstrip::Filmstrip;
 use super::{control, joints, sequence};
 use crate::session::{Intent, Session};
@@ -14,6 +15,7 @@ const PARTS_HEIGHT: f32 = 170.0;
 /// State of the sections.
 #[derive(Default)]
 pub struct Below {
+    connections: Connections,
     filmstrip: Filmstrip,
     clearances: Clearances,
     /// Height of the sections in the last frame, points.
@@ -42,6 +44,7 @@ impl Below {
                     .show(ui, |ui| {
                         ui.spacing_mut().item_spacing.y = 2.0;
                         joints::show(ui, session, wanted);
+                        self.connections.show(ui, session, view, wanted);
                         sequence::show(ui, &mut self.filmstrip, session, view, wanted);
                         self.clearances.show(ui, session, view);
                     });

@@ -9,6 +9,7 @@ mod cards;
 mod clearances;
 mod command;
 mod commissioning;
+mod connections;
 mod control;
 mod cube;
 mod description;

@@ -38,6 +38,7 @@ pub fn show(
         document,
         marked: &view.marked.parts,
         over: view.over.before,
+        pair: view.pair,
         under: &under,
     };
     let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
@@ -127,6 +128,8 @@ struct Listed<'a> {
     marked: &'a [usize],
     /// The part under the pointer in the frame before.
     over: Option<usize>,
+    /// The parts of the connection under the pointer.
+    pair: Option<[usize; 2]>,
     /// The part whose line is under the pointer.
     under: &'a Cell<Option<usize>>,
 }
@@ -155,8 +158,10 @@ fn line(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, part: usize) 
         document,
         marked,
         over,
+        pair,
         under,
     } = listed;
+    let pointed = over == Some(part) || pair.is_some_and(|pair| pair.contains(&part));
     let (name, color) = (document.part_name(part), document.colors[part]);
     let (selected, held) = (session.selected == Some(part), session.grabbed() == Some(part));
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 28.0), Sense::click());
@@ -165,7 +170,7 @@ fn line(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, part: usize) 
     if response.hovered() {
         under.set(Some(part));
     }
-    let fill = match (held, selected, response.hovered() || over == Some(part)) {
+    let fill = match (held, selected, response.hovered() || pointed) {
         (true, ..) => theme::of(ui).held.gamma_multiply(0.22),
         (_, true, _) => theme::of(ui).accent_dim.gamma_multiply(0.8),
         _ if marked.contains(&part) => theme::of(ui).accent_dim.gamma_multiply(0.5),

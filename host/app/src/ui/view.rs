@@ -55,6 +55,7 @@ pub fn show(
             cut,
             marked: &view.marked.parts,
             over: view.over.now,
+            pair: view.pair,
             ground,
             scale,
         };

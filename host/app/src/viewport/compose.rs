@@ -61,10 +61,19 @@ pub struct Look<'a> {
     pub marked: &'a [usize],
     /// The part under the pointer.
     pub over: Option<usize>,
+    /// The parts of the connection under the pointer: outlined, and the others drawn as glass.
+    pub pair: Option<[usize; 2]>,
     /// Background.
     pub ground: Ground,
     /// Pixels per point; 0: edges have no width.
     pub scale: f32,
+}
+
+impl Look<'_> {
+    /// Whether the pointer is on a part or on a connection of it.
+    fn is_over(&self, part: usize) -> bool {
+        self.over == Some(part) || self.pair.is_some_and(|pair| pair.contains(&part))
+    }
 }
 
 /// The picture of `document` in the state of `session`.
@@ -81,12 +90,13 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
     let touching = session.telemetry.as_deref().filter(|_| held.is_some());
     // A part within others is seen through them.
     let focus = session.joints.in_focus(document);
+    let focus = focus.or(look.pair.map(Vec::from));
     let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
         .filter(|&(index, _)| !document.is_hidden(index) || held == Some(index))
         .map(|(index, part)| {
             let in_hand = held == Some(index);
             let marked =
-                session.selected == Some(index) || look.over == Some(index) || look.marked.contains(&index);
+                session.selected == Some(index) || look.is_over(index) || look.marked.contains(&index);
             let aside = focus.as_ref().is_some_and(|focus| !focus.contains(&index));
             let glass = aside || look.see_through && !in_hand && is_fixed(document, index);
             Item {
@@ -145,7 +155,7 @@ fn tint(part: usize, held: Option<usize>, look: &Look<'_>) -> [f32; 4] {
         TINT_HELD
     } else if look.marked.contains(&part) {
         TINT_MARKED
-    } else if look.over == Some(part) {
+    } else if look.is_over(part) {
         TINT_OVER
     } else {
         [0.0; 4]

@@ -70,6 +70,8 @@ pub struct Viewpoint {
     pub marked: Marked,
     /// What the pointer is on.
     pub over: Over,
+    /// The connected parts whose connection the pointer is on, in this frame.
+    pub pair: Option<[usize; 2]>,
     /// What was clicked last, in the open document.
     pub picked: Option<Pick>,
     /// The measuring tool.
@@ -96,6 +98,7 @@ impl Viewpoint {
             now: None,
             before: self.over.now,
         };
+        self.pair = None;
     }
 
     /// Moves smoothly until everything is visible.

@@ -4,6 +4,7 @@ mod clearances;
 mod command_line;
 mod common;
 mod connecting;
+mod connections;
 #[cfg(target_os = "linux")]
 mod desktop_theme;
 mod firmware;
