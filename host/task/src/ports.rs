@@ -26,6 +26,8 @@ use crate::threads::{helical, is_threaded};
 
 /// Least share of the part's area that a plane port has.
 const PLANE_SHARE: f64 = 0.01;
+/// Faces about an axis with a smaller gap between them are one stretch, mm.
+const JOINED_MM: f64 = 1e-3;
 /// Share by which sides of a regular profile differ: its file's rounding.
 const REGULAR: f64 = 1e-3;
 
@@ -132,7 +134,7 @@ impl fmt::Display for Port {
 /// queries a hole.
 pub fn ports(assembly: &Assembly, part: usize) -> Vec<Port> {
     let thread = is_threaded(assembly, part) || helical(assembly, part);
-    let surfaces = (assembly.surfaces(part).iter()).filter_map(|m| of_surface(assembly, part, m, thread));
+    let surfaces = (assembly.surfaces(part).iter()).flat_map(|m| of_surface(assembly, part, m, thread));
     let profiles = (assembly.profiles(part).iter()).map(|profile| of_profile(assembly, part, profile));
     surfaces.chain(profiles).collect()
 }
@@ -146,7 +148,43 @@ fn port(geometry: Geometry, facts: &Facts) -> Port {
     }
 }
 
-fn of_surface(assembly: &Assembly, part: usize, merged: &MergedSurface, thread: bool) -> Option<Port> {
+fn of_surface(assembly: &Assembly, part: usize, merged: &MergedSurface, thread: bool) -> Vec<Port> {
+    let (Surface::Cylinder { frame, .. } | Surface::Cone { frame, .. }) = merged.surface else {
+        return of_faces(assembly, part, merged, thread).into_iter().collect();
+    };
+    // A shaft that a groove or a collar interrupts is two.
+    let (origin, axis) = placed(assembly.placement(part), frame);
+    (pieces(assembly, part, &merged.faces, origin, axis).into_iter())
+        .filter_map(|faces| {
+            let merged = MergedSurface {
+                faces,
+                ..merged.clone()
+            };
+            of_faces(assembly, part, &merged, thread)
+        })
+        .collect()
+}
+
+/// Faces about an axis by the stretches that they cover.
+fn pieces(assembly: &Assembly, part: usize, faces: &[u32], origin: DVec3, axis: DVec3) -> Vec<Vec<u32>> {
+    let mut each: Vec<([f64; 2], u32)> = (faces.iter())
+        .filter_map(|&face| Some((extent(assembly, part, &[face], origin, axis)?, face)))
+        .collect();
+    each.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+    let mut pieces: Vec<(f64, Vec<u32>)> = Vec::new();
+    for ([low, high], face) in each {
+        match pieces.last_mut() {
+            Some((end, piece)) if low <= *end + JOINED_MM => {
+                *end = end.max(high);
+                piece.push(face);
+            }
+            _ => pieces.push((high, vec![face])),
+        }
+    }
+    pieces.into_iter().map(|(_, piece)| piece).collect()
+}
+
+fn of_faces(assembly: &Assembly, part: usize, merged: &MergedSurface, thread: bool) -> Option<Port> {
     let pose = assembly.placement(part);
     let sex = if merged.side == Side::Convex {
         "male"

@@ -219,3 +219,101 @@ fn screws_hold_in_the_last_part_or_in_their_nut() {
         assert!(screwed.iter().all(has), "{file}: {screwed:?}");
     }
 }
+
+/// Ports that are no planes, beside a table by hand from the dimensions with which the files were made: kind, diameter (of profiles none: their circle), length.
+#[test]
+fn shared_parts_have_the_ports_of_their_table() {
+    let Some(folder) = support::shared("shared_parts_have_the_ports_of_their_table") else {
+        return;
+    };
+    type Table<'a> = &'a [(&'a str, f64, f64)];
+    let tables: &[(&str, &str, Table<'_>)] = &[
+        // Grooves of 1.1 mm and ⌀ 5 at both ends of a pin of 58 mm.
+        (
+            "10_extraction/hinge.step",
+            "hinge_pin",
+            &[
+                ("shaft", 6.0, 52.0),
+                ("shaft", 6.0, 1.9),
+                ("shaft", 6.0, 1.9),
+                ("collar", 5.0, 1.1),
+                ("collar", 5.0, 1.1),
+            ],
+        ),
+        (
+            "10_extraction/hinge.step",
+            "bush_1",
+            &[
+                ("through_bore", 6.2, 9.85),
+                ("shaft", 9.9, 8.85),
+                ("collar", 14.0, 1.0),
+            ],
+        ),
+        (
+            "10_extraction/gearbox.step",
+            "input_bearing",
+            &[("through_bore", 10.04, 5.9), ("collar", 25.94, 5.9)],
+        ),
+        (
+            "10_extraction/box_with_board.step",
+            "screw_1",
+            &[("threaded_shaft", 3.0, 18.0), ("threaded_shaft", 6.0, 2.5)],
+        ),
+        (
+            "06_joints/cone_in_cone.step",
+            "taper-plug",
+            &[("shaft", 20.0, 15.0), ("taper", 20.0, 30.0)],
+        ),
+        (
+            "06_joints/ball_in_socket.step",
+            "socket",
+            &[("socket", 20.0, 0.0), ("square_shaft", 40.0 * 2f64.sqrt(), 25.0)],
+        ),
+        (
+            "06_joints/two_pin_exact.step",
+            "socket-plate",
+            &[
+                ("through_bore", 6.0, 15.0),
+                ("through_bore", 6.0, 15.0),
+                ("prism", 60f64.hypot(40.0), 15.0),
+                ("prism", 40f64.hypot(15.0), 60.0),
+            ],
+        ),
+    ];
+    for (file, part, table) in tables {
+        let assembly = support::load(&folder, file);
+        let found = ports(&assembly, assembly.part(part).unwrap());
+        let mut found: Vec<(&str, f64, f64)> = (found.iter())
+            .filter_map(|port| {
+                let (diameter, [low, high]) = match port.geometry {
+                    Geometry::Extrusion {
+                        diameter_mm,
+                        capacity_mm,
+                        ..
+                    } => (diameter_mm, capacity_mm),
+                    Geometry::Taper {
+                        diameters_mm: [a, b],
+                        capacity_mm,
+                        ..
+                    } => (a.max(b), capacity_mm),
+                    Geometry::Point { diameter_mm, .. } => (diameter_mm, [0.0; 2]),
+                    Geometry::Plane { .. } => return None,
+                };
+                Some((port.is[0], diameter, high - low))
+            })
+            .collect();
+        let mut wanted = table.to_vec();
+        for list in [&mut found, &mut wanted] {
+            list.sort_by(|a, b| {
+                (a.0.cmp(b.0))
+                    .then(a.1.total_cmp(&b.1))
+                    .then(a.2.round().total_cmp(&b.2.round()))
+            });
+        }
+        assert_eq!(found.len(), wanted.len(), "{file}, {part}: {found:?}");
+        for (is, wanted) in found.iter().zip(&wanted) {
+            let same = is.0 == wanted.0 && (is.1 - wanted.1).abs() < 1e-6 && (is.2 - wanted.2).abs() < 1e-6;
+            assert!(same, "{file}, {part}: {is:?} for {wanted:?}");
+        }
+    }
+}
