@@ -33,11 +33,8 @@ impl GroupScene {
             .map(|part| model.parts[*part].name.as_str())
             .collect();
         let name = names.join(", ");
-        let mut scene = CadModel {
-            shapes: model.shapes.clone(),
-            parts: Vec::new(),
-            ..model.clone()
-        };
+        let mut scene = model.clone();
+        scene.parts.clear();
         scene.shapes.push(joined(model, &group));
         scene.parts.push(Part {
             name: name.clone(),

@@ -19,6 +19,8 @@ const BEYOND: f64 = 0.2;
 const BEYOND_MM: f64 = 0.05;
 /// Where beside an outline, as a share of a corner's distance from its centre.
 const BESIDE: f64 = 0.98;
+/// Faces about an axis with a smaller gap between them are one stretch, mm.
+const JOINED_MM: f64 = 1e-3;
 /// Least common length of a fit, mm.
 const COMMON_MM: f64 = 0.2;
 
@@ -43,10 +45,9 @@ pub struct Fit {
     pub is_through: bool,
 }
 
-/// A merged cylinder of a part, in the assembly's frame.
+/// A stretch of a merged cylinder of a part, in the assembly's frame.
 struct Round {
-    /// Its place in [`Assembly::surfaces`].
-    surface: usize,
+    faces: Vec<u32>,
     radius: f64,
     origin: DVec3,
     axis: DVec3,
@@ -69,19 +70,24 @@ impl<'a> Ends<'a> {
             bores: Vec::new(),
             profiles: assembly.profiles(part),
         };
-        for (surface, merged) in assembly.surfaces(part).iter().enumerate() {
+        for merged in assembly.surfaces(part) {
             let Surface::Cylinder { frame, radius } = merged.surface else {
                 continue;
             };
-            let round = Round {
-                surface,
+            let (origin, axis) = (
+                place.transform_point3(frame.origin),
+                place.transform_vector3(frame.z),
+            );
+            let rounds = stretches(assembly, part, &merged.faces, origin, axis).into_iter();
+            let rounds = rounds.map(|faces| Round {
+                faces,
                 radius,
-                origin: place.transform_point3(frame.origin),
-                axis: place.transform_vector3(frame.z),
-            };
+                origin,
+                axis,
+            });
             match merged.side {
-                Side::Convex => found.shafts.push(round),
-                Side::Concave => found.bores.push(round),
+                Side::Convex => found.shafts.extend(rounds),
+                Side::Concave => found.bores.extend(rounds),
                 Side::Flat => {}
             }
         }
@@ -116,10 +122,7 @@ fn in_bore(assembly: &Assembly, (a, shaft): (usize, &Round), (b, bore): (usize, 
     if z.cross(bore.axis).length() > COAXIAL_RAD || apart > clearance.abs() + 1e-3 {
         return None;
     }
-    let along = |part: usize, round: &Round| {
-        let faces = &assembly.surfaces(part)[round.surface].faces;
-        extent(assembly, part, faces, o, z)
-    };
+    let along = |part: usize, round: &Round| extent(assembly, part, &round.faces, o, z);
     let ends = along(b, bore)?;
     let (center, length_mm) = common(o, z, along(a, shaft)?, ends)?;
     Some(Fit {
@@ -183,6 +186,31 @@ fn in_hole(assembly: &Assembly, (a, male): (usize, &Profile), (b, hole): (usize,
         length_mm,
         is_through: is_through_profile(assembly, b, hole),
     })
+}
+
+/// Faces about an axis by the stretches that they cover: a groove or a collar interrupts a shaft.
+pub(crate) fn stretches(
+    assembly: &Assembly,
+    part: usize,
+    faces: &[u32],
+    origin: DVec3,
+    axis: DVec3,
+) -> Vec<Vec<u32>> {
+    let mut each: Vec<([f64; 2], u32)> = (faces.iter())
+        .filter_map(|&face| Some((extent(assembly, part, &[face], origin, axis)?, face)))
+        .collect();
+    each.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+    let mut found: Vec<(f64, Vec<u32>)> = Vec::new();
+    for ([low, high], face) in each {
+        match found.last_mut() {
+            Some((end, stretch)) if low <= *end + JOINED_MM => {
+                *end = end.max(high);
+                stretch.push(face);
+            }
+            _ => found.push((high, vec![face])),
+        }
+    }
+    found.into_iter().map(|(_, stretch)| stretch).collect()
 }
 
 /// Interval of some faces of a part along an axis in the assembly's frame, mm from `origin`.

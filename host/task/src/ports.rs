@@ -19,15 +19,13 @@ use mortise_mating::{MergedSurface, Side};
 use serde::Serialize;
 
 use crate::assembly::Assembly;
-use crate::fits::{extent, is_through, is_through_profile};
+use crate::fits::{extent, is_through, is_through_profile, stretches};
 use crate::profile::Profile;
 use crate::taxonomy::{Facts, PortKind, kinds};
 use crate::threads::{helical, is_threaded};
 
 /// Least share of the part's area that a plane port has.
 const PLANE_SHARE: f64 = 0.01;
-/// Faces about an axis with a smaller gap between them are one stretch, mm.
-const JOINED_MM: f64 = 1e-3;
 /// Share by which sides of a regular profile differ: its file's rounding.
 const REGULAR: f64 = 1e-3;
 
@@ -154,7 +152,7 @@ fn of_surface(assembly: &Assembly, part: usize, merged: &MergedSurface, thread: 
     };
     // A shaft that a groove or a collar interrupts is two.
     let (origin, axis) = placed(assembly.placement(part), frame);
-    (pieces(assembly, part, &merged.faces, origin, axis).into_iter())
+    (stretches(assembly, part, &merged.faces, origin, axis).into_iter())
         .filter_map(|faces| {
             let merged = MergedSurface {
                 faces,
@@ -163,25 +161,6 @@ fn of_surface(assembly: &Assembly, part: usize, merged: &MergedSurface, thread: 
             of_faces(assembly, part, &merged, thread)
         })
         .collect()
-}
-
-/// Faces about an axis by the stretches that they cover.
-fn pieces(assembly: &Assembly, part: usize, faces: &[u32], origin: DVec3, axis: DVec3) -> Vec<Vec<u32>> {
-    let mut each: Vec<([f64; 2], u32)> = (faces.iter())
-        .filter_map(|&face| Some((extent(assembly, part, &[face], origin, axis)?, face)))
-        .collect();
-    each.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
-    let mut pieces: Vec<(f64, Vec<u32>)> = Vec::new();
-    for ([low, high], face) in each {
-        match pieces.last_mut() {
-            Some((end, piece)) if low <= *end + JOINED_MM => {
-                *end = end.max(high);
-                piece.push(face);
-            }
-            _ => pieces.push((high, vec![face])),
-        }
-    }
-    pieces.into_iter().map(|(_, piece)| piece).collect()
 }
 
 fn of_faces(assembly: &Assembly, part: usize, merged: &MergedSurface, thread: bool) -> Option<Port> {

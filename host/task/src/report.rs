@@ -6,7 +6,8 @@ use glam::{DAffine3, DQuat, DVec3};
 use serde::Serialize;
 
 use crate::assembly::{Assembly, Moved};
-use crate::graph::graph;
+use crate::fits::Fit;
+use crate::graph::{Edge, graph};
 use crate::mobility::{Freedoms, Reach, freedoms};
 use crate::removal::{Blocked, Path};
 use crate::sequence::{Sequence, Step};
@@ -390,14 +391,6 @@ pub struct ConnectionReport<'a> {
     pub fits: Vec<FitReport<'a>>,
 }
 
-impl ConnectionReport<'_> {
-    /// Its kinds in words, strongest first.
-    pub fn words(&self) -> String {
-        let words: Vec<&str> = self.kinds.iter().map(|kind| kind.kind().words.as_str()).collect();
-        words.join(", ")
-    }
-}
-
 /// A connection, and what it leaves free.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeConnection<'a> {
@@ -410,11 +403,13 @@ pub struct FreeConnection<'a> {
 
 /// The connection graph with what each connection leaves free. Cost: the freedoms of one part against the other, for each.
 pub fn free_connections(assembly: &Assembly) -> Vec<FreeConnection<'_>> {
-    let parts: Vec<[usize; 2]> = graph(assembly).edge_weights().map(|edge| edge.parts).collect();
-    (connections(assembly).into_iter().zip(parts))
-        .map(|(connection, [first, second])| FreeConnection {
-            connection,
-            freedoms: part_mobility(assembly, &[first], &freedoms_of(assembly, &[first], &[second])),
+    (graph(assembly).edge_weights())
+        .map(|edge| {
+            let [first, second] = edge.parts;
+            FreeConnection {
+                connection: connection(assembly, edge),
+                freedoms: part_mobility(assembly, &[first], &freedoms_of(assembly, &[first], &[second])),
+            }
         })
         .collect()
 }
@@ -442,32 +437,28 @@ pub struct FitReport<'a> {
 
 /// The connection graph.
 pub fn connections(assembly: &Assembly) -> Vec<ConnectionReport<'_>> {
-    let graph = graph(assembly);
-    graph
-        .edge_weights()
-        .map(|edge| ConnectionReport {
-            a: assembly.name(edge.parts[0]),
-            b: assembly.name(edge.parts[1]),
-            kinds: edge.kinds.clone(),
-            contacts: edge
-                .contacts
-                .iter()
-                .map(|&i| assembly.contacts[i].kind.name())
-                .collect(),
-            fits: edge
-                .fits
-                .iter()
-                .map(|fit| FitReport {
-                    shaft: assembly.name(fit.parts[0]),
-                    bore: assembly.name(fit.parts[1]),
-                    center_mm: fit.center.to_array(),
-                    axis: fit.axis.to_array(),
-                    diameter_mm: 2.0 * fit.radius_mm,
-                    clearance_um: 2e3 * fit.clearance_mm,
-                    length_mm: fit.length_mm,
-                    round: fit.is_round,
-                })
-                .collect(),
-        })
+    (graph(assembly).edge_weights())
+        .map(|edge| connection(assembly, edge))
         .collect()
+}
+
+fn connection<'a>(assembly: &'a Assembly, edge: &Edge) -> ConnectionReport<'a> {
+    let fit = |fit: &Fit| FitReport {
+        shaft: assembly.name(fit.parts[0]),
+        bore: assembly.name(fit.parts[1]),
+        center_mm: fit.center.to_array(),
+        axis: fit.axis.to_array(),
+        diameter_mm: 2.0 * fit.radius_mm,
+        clearance_um: 2e3 * fit.clearance_mm,
+        length_mm: fit.length_mm,
+        round: fit.is_round,
+    };
+    let kind = |contact: &usize| assembly.contacts[*contact].kind.name();
+    ConnectionReport {
+        a: assembly.name(edge.parts[0]),
+        b: assembly.name(edge.parts[1]),
+        kinds: edge.kinds.clone(),
+        contacts: edge.contacts.iter().map(kind).collect(),
+        fits: edge.fits.iter().map(fit).collect(),
+    }
 }

@@ -212,6 +212,12 @@ impl Connection {
     }
 }
 
+/// Kinds of connections in words.
+pub fn words(kinds: &[Connection]) -> String {
+    let words: Vec<&str> = kinds.iter().map(|kind| kind.kind().words.as_str()).collect();
+    words.join(", ")
+}
+
 impl Serialize for Connection {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.kind().name)

@@ -56,7 +56,11 @@ pub(crate) fn holds(assembly: &Assembly, fits: &[Fit]) -> Vec<bool> {
     let threaded: Vec<bool> = (0..assembly.count())
         .map(|part| is_threaded(assembly, part))
         .collect();
-    let is_modelled = |fit: &Fit| fit.parts.iter().all(|&part| helical(assembly, part));
+    let has_fit = |part: usize| fits.iter().any(|fit| fit.parts.contains(&part));
+    let modelled: Vec<bool> = (0..assembly.count())
+        .map(|part| has_fit(part) && helical(assembly, part))
+        .collect();
+    let is_modelled = |fit: &Fit| fit.parts.iter().all(|&part| modelled[part]);
     let mut held: Vec<bool> = (fits.iter())
         .map(|fit| fit.is_round && (threaded[fit.parts[1]] || is_modelled(fit)))
         .collect();

@@ -5,7 +5,7 @@ mod support;
 use mortise_shapes::KINDS;
 use mortise_task::graph::{Edge, graph};
 use mortise_task::ports::{Geometry, Port, ports};
-use mortise_task::{catalogue, report};
+use mortise_task::{Assembly, catalogue, report};
 
 fn kinds(edge: &Edge) -> Vec<&'static str> {
     edge.kinds.iter().map(|kind| kind.kind().name.as_str()).collect()
@@ -96,6 +96,31 @@ fn connections_have_their_kinds() {
     assert_eq!(connected("cone_in_cone.step"), ["seated"]);
     assert_eq!(connected("ball_in_socket.step"), ["ball"]);
     assert_eq!(connected("ball_in_cylinder.step"), ["ball"]);
+}
+
+/// Rings sit in the grooves at both ends of a pin; one that is moved between the grooves is in none.
+#[test]
+fn between_two_grooves_there_is_no_fit_of_their_diameter() {
+    let Some(folder) = support::shared("between_two_grooves_there_is_no_fit_of_their_diameter") else {
+        return;
+    };
+    let mut model = support::load(&folder.join("10_extraction"), "hinge.step").model;
+    for count in [2, 1] {
+        let assembly = Assembly::new(model.clone()).unwrap();
+        let in_groove: Vec<f64> = (graph(&assembly).edge_weights())
+            .flat_map(|edge| &edge.fits)
+            .filter(|fit| fit.is_round && (fit.radius_mm - 2.5).abs() < 1e-9)
+            .map(|fit| fit.length_mm)
+            .collect();
+        assert_eq!(in_groove.len(), count, "{in_groove:?}");
+        assert!(
+            in_groove.iter().all(|length| (length - 1.0).abs() < 1e-6),
+            "{in_groove:?}"
+        );
+        // Along the pin.
+        let ring = assembly.part("ring_left").unwrap();
+        model.parts[ring].placement.translation.x += 20.0;
+    }
 }
 
 /// Plugs and shafts of any form in holes of theirs: connected as guided, with the designed clearance to the accuracy of the tessellation.

@@ -12,6 +12,7 @@ use mortise_rig::RigSpec;
 use mortise_task::removal::{Budget, Removal, remove};
 use mortise_task::report::{self, Sense, SequenceReport};
 use mortise_task::sequence::{self, Sequence, Step};
+use mortise_task::taxonomy::words;
 use mortise_task::{Assembly, Wishes, catalogue, ports};
 use serde::Serialize;
 
@@ -335,7 +336,7 @@ pub fn features(args: &FeaturesArgs) -> anyhow::Result<ExitCode> {
         }
     }
     for c in &report::connections(&assembly) {
-        lines::text(&format!("{} – {}: {}", c.a, c.b, c.words()))?;
+        lines::text(&format!("{} – {}: {}", c.a, c.b, words(&c.kinds)))?;
     }
     Ok(ExitCode::SUCCESS)
 }

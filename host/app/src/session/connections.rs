@@ -6,6 +6,7 @@ use glam::DAffine3;
 use mortise_task::Assembly;
 use mortise_task::fits::Fit;
 use mortise_task::graph::{Edge, graph};
+use mortise_task::taxonomy::words;
 
 use super::document::Document;
 use super::sequence::are_same;
@@ -48,12 +49,9 @@ impl Connected {
 
 /// Kinds of a connection in words.
 fn kinds(edge: &Edge) -> String {
-    let words: Vec<&str> = (edge.kinds.iter())
-        .map(|kind| kind.kind().words.as_str())
-        .collect();
-    match words.is_empty() {
+    match edge.kinds.is_empty() {
         true => "overlapping".to_owned(),
-        false => words.join(", "),
+        false => words(&edge.kinds),
     }
 }
 

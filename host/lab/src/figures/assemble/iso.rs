@@ -98,11 +98,13 @@ impl Tally {
         let kinds = connections.iter().flat_map(|one| one.kinds.first());
         self.kinds.extend(kinds.map(|kind| kind.kind().name.as_str()));
         // On the way a pressed pair overlaps as it does in place.
-        let stated = (report.steps.first()).map(|step| match step.overlap_um {
-            Some(overlap) if overlap > 0.0 => -overlap,
-            _ => step.clearance_um.unwrap_or(f64::NAN),
+        let stated = (report.steps.first()).and_then(|step| match step.overlap_um {
+            Some(overlap) if overlap > 0.0 => Some(-overlap),
+            _ => step.clearance_um,
         });
-        self.off_um = self.off_um.max((stated.unwrap_or(f64::NAN) - gap_um).abs());
+        // What is not stated is off by any bound.
+        let off_um = stated.map_or(f64::INFINITY, |stated| (stated - gap_um).abs());
+        self.off_um = self.off_um.max(off_um);
         Ok(())
     }
 
