@@ -51,6 +51,9 @@ pub enum RecordError {
         /// What is missing.
         why: String,
     },
+    /// The replay was cancelled.
+    #[error("the replay was cancelled")]
+    Cancelled,
     /// The rig did not take a message.
     #[error(transparent)]
     Rig(#[from] RigError),

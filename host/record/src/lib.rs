@@ -17,4 +17,4 @@ pub use columns::{Ticks, decode, encode};
 pub use error::RecordError;
 pub use reading::{Entry, EntryKind, Recording};
 pub use recorder::{Recorder, Written};
-pub use replay::{Difference, Replayed, replay};
+pub use replay::{Difference, Replayed, replay, replay_with};

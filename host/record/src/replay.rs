@@ -6,6 +6,7 @@
 //! Cost: about 20 µs a tick.
 
 use std::collections::{HashSet, VecDeque};
+use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mortise_protocol::message::{Fault, FromDevice, TickInput, ToDevice};
@@ -81,6 +82,18 @@ struct Session {
 /// # Errors
 /// `NothingToReplay` when it holds no inputs, or no reset or upload of a scene whose image is attached; `Rig` when the simulation ends.
 pub fn replay(recording: &Recording, changes: &[(ParameterId, f32)]) -> Result<Replayed, RecordError> {
+    replay_with(recording, changes, &|_| ControlFlow::Continue(()))
+}
+
+/// As [`replay()`]. `progress` is given the share that is done, 0 to 1, after each thousand ticks, and may end the replay.
+///
+/// # Errors
+/// As [`replay()`]; `Cancelled` when `progress` ends it.
+pub fn replay_with(
+    recording: &Recording,
+    changes: &[(ParameterId, f32)],
+    progress: &dyn Fn(f64) -> ControlFlow<()>,
+) -> Result<Replayed, RecordError> {
     let nothing = |why: &str| RecordError::NothingToReplay {
         path: recording.path().to_owned(),
         why: why.to_owned(),
@@ -91,7 +104,7 @@ pub fn replay(recording: &Recording, changes: &[(ParameterId, f32)]) -> Result<R
     }
     let mut player = Player::new(recording, &session, changes)?;
     let recorded = session.ticks.len() as u64;
-    player.play(session)?;
+    player.play(session, progress)?;
     let result = player.result;
     if result.compared == 0 {
         return Err(nothing(
@@ -237,9 +250,17 @@ impl<'r> Player<'r> {
         })
     }
 
-    fn play(&mut self, mut session: Session) -> Result<(), RigError> {
+    fn play(
+        &mut self,
+        mut session: Session,
+        progress: &dyn Fn(f64) -> ControlFlow<()>,
+    ) -> Result<(), RecordError> {
         let mut before: Option<Tick> = None;
-        for tick in session.ticks {
+        let count = session.ticks.len();
+        for (index, tick) in session.ticks.into_iter().enumerate() {
+            if index % AT_ONCE == 0 && progress(index as f64 / count as f64).is_break() {
+                return Err(RecordError::Cancelled);
+            }
             let timed_out = session.timed_out.contains(&tick.number);
             self.interrupt(before.as_ref(), &tick, timed_out)?;
             let stopped = before
@@ -266,7 +287,7 @@ impl<'r> Player<'r> {
             }
             before = Some(tick);
         }
-        self.run()
+        Ok(self.run()?)
     }
 
     /// Ends the comparison where the recording does not determine the next tick.

@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use mortise_output::{Existing, Output, OutputError};
 
+use super::chart::{TracesFile, charts, picture};
 use super::flashing::FlashIntent;
 use super::history::{Signal, csv};
 use super::intent::{Intent, Traces};
 use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
 use super::rig_page::RigIntent;
-use super::run::RunIntent;
+use super::runs::RunIntent;
 use super::state::Session;
 use super::threads::spawn;
 
@@ -25,6 +26,7 @@ pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
         Purpose::OpenRun => Intent::Run(RunIntent::Open(path)),
         Purpose::CompareRun => Intent::Run(RunIntent::Compare(path)),
         Purpose::SaveRunReport => Intent::Run(RunIntent::WriteReport { path, replace }),
+        Purpose::SaveRunTable => Intent::Run(RunIntent::WriteTable { path, replace }),
         Purpose::OpenFirmware => Intent::Flash(FlashIntent::Choose(path)),
         Purpose::OpenRig => Intent::Rig(RigIntent::Load(path)),
         Purpose::SaveRig => Intent::Rig(RigIntent::Write { path, replace }),
@@ -72,20 +74,26 @@ impl Session {
         }
     }
 
-    /// Makes a table of traces as they are now, and asks where to write it.
+    /// Makes files of traces as they are now, and asks where to write one.
     pub(super) fn export(&mut self, traces: &Traces) {
         let signals: Vec<&Signal> = (traces.keys.iter())
             .filter_map(|key| Signal::named(key))
             .collect();
-        let [from_s, to_s] = traces.range_s;
-        self.table = Some(csv(self.shown_history(), &signals, from_s, to_s));
+        let ([from_s, to_s], history) = (traces.range_s, self.shown_history());
+        self.table = Some(TracesFile {
+            csv: csv(history, &signals, from_s, to_s),
+            svg: picture(&charts(history, self.playback.as_ref(), &signals, traces.range_s)),
+        });
         self.ask_for_path(Purpose::SaveTraces);
     }
 
-    /// Writes the table that waits for its path.
+    /// Writes the traces that wait for their path: a picture where it ends in `.svg`, otherwise a table.
     pub(super) fn save_traces(&mut self, path: PathBuf, replace: bool) {
-        if let Some(table) = self.table.take() {
-            write(&self.outbox, path, replace, table);
+        if let Some(TracesFile { csv, svg }) = self.table.take() {
+            let is_picture = path
+                .extension()
+                .is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+            write(&self.outbox, path, replace, if is_picture { svg } else { csv });
         }
     }
 }

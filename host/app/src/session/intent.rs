@@ -19,12 +19,15 @@ use super::joints::JointIntent;
 use super::link::Link;
 use super::moves::Motion;
 use super::rig_page::RigIntent;
-use super::run::RunIntent;
+use super::runs::RunIntent;
 use super::state::Session;
+use super::workspace::Workspace;
 
 /// An action that the operator requests.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Intent {
+    /// Show a workspace.
+    Show(Workspace),
     /// Choose a file in a dialog.
     Browse,
     /// Open a file.
@@ -220,7 +223,7 @@ impl Intent {
                 | Self::Run(_)
                 | Self::Joint(_)
                 | Self::Connections(_)
-                | Self::Rig(RigIntent::Show(_))
+                | Self::Show(_)
                 | Self::Demo(_)
         )
     }
@@ -251,6 +254,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         | Intent::FitWith(_)
         | Intent::DropFits
         | Intent::ForgetRecent(_)
+        | Intent::Show(_)
         | Intent::Fold { .. } => None,
         Intent::Browse | Intent::Open(_) | Intent::OpenSample => {
             armed.then(|| "The rig is armed: disarm it before another file is opened".to_owned())

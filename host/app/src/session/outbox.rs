@@ -18,11 +18,13 @@ use super::flashing::FlashUpdate;
 use super::introduction::RigSent;
 use super::joints::JointsFound;
 use super::purpose::Purpose;
+use super::recomputed::RecomputeUpdate;
 use super::recording::RecordingUpdate;
-use super::run::RunRead;
+use super::runs::RunRead;
 use super::saved::Saved;
 use super::sequencing::SequenceFound;
 use super::tap::Tap;
+use super::threads::Cancel;
 use super::ways::WaysFound;
 use crate::kept::Mark;
 use crate::kept::project::Project;
@@ -105,6 +107,8 @@ pub enum Update {
     Flashing(FlashUpdate),
     /// Reading a recorded run ended.
     Run(RunRead),
+    /// A run is being computed again, by the computation that this flag ends.
+    Recompute(Cancel, RecomputeUpdate),
     /// A file was written, or one line with the reason why not.
     Written(Result<String, String>),
 }

@@ -126,6 +126,7 @@ impl Session {
             Intent::CancelInstruction => self.cancel_instruction(),
             Intent::Record => self.begin_recording(),
             Intent::EndRecording => self.end_recording(),
+            Intent::Show(workspace) => self.show_workspace(workspace),
             Intent::Run(intent) => self.perform_on_run(intent),
             Intent::Rig(intent) => self.perform_on_rig(intent),
             Intent::Flash(intent) => self.perform_flashing(intent),

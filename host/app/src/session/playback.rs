@@ -11,8 +11,10 @@ use super::notes::Severity;
 use super::outbox::Update;
 use super::pose;
 use super::purpose::Purpose;
-use super::run::{Playback, Run, RunIntent, RunRead};
+use super::run::Run;
 use super::run_report::html;
+use super::run_table;
+use super::runs::{MOST_RUNS, Playback, RunIntent, RunRead};
 use super::state::Session;
 use super::threads::spawn;
 
@@ -27,8 +29,22 @@ impl Session {
                 Link::None => return None,
                 _ => "Disconnect first: with a rig, the parts are where it has them",
             },
-            _ if self.playback.is_none() => "Open a run first",
-            _ => return None,
+            _ => {
+                let Some(playback) = &self.playback else {
+                    return Some("Open a run first".to_owned());
+                };
+                let is_computed = playback.runs().iter().any(|shown| shown.recomputation.is_some());
+                match intent {
+                    RunIntent::BrowseOther | RunIntent::Compare(_) if playback.runs().len() >= MOST_RUNS => {
+                        return Some(format!("{MOST_RUNS} runs are shown: close one first"));
+                    }
+                    RunIntent::Recompute(..) if is_computed => {
+                        "A run is being computed again: wait for it, or cancel it"
+                    }
+                    RunIntent::CancelRecompute if !is_computed => "No run is being computed again",
+                    _ => return None,
+                }
+            }
         };
         Some(reason.to_owned())
     }
@@ -39,16 +55,25 @@ impl Session {
             RunIntent::BrowseOther => self.ask_for_path(Purpose::CompareRun),
             RunIntent::Open(path) => self.read_run(path, false),
             RunIntent::Compare(path) => self.read_run(path, true),
-            RunIntent::Play(plays) => {
+            RunIntent::Choose(index) => {
                 if let Some(playback) = &mut self.playback {
-                    // From the end it begins anew.
-                    if plays && playback.at_s >= playback.run.duration_s() {
-                        playback.go_to(0.0);
-                    }
-                    playback.plays = plays;
-                    self.played = Some(Instant::now());
+                    playback.choose(index);
+                }
+                self.show_frame();
+            }
+            RunIntent::Draw(index, drawn) => {
+                if let Some(shown) = self.playback.as_mut().and_then(|p| p.shown_mut(index)) {
+                    shown.drawn = drawn;
                 }
             }
+            RunIntent::Remove(index) => {
+                if self.playback.as_mut().is_some_and(|p| p.remove(index)) {
+                    self.show_frame();
+                } else {
+                    self.close_run();
+                }
+            }
+            RunIntent::Play(plays) => self.play_run(plays),
             RunIntent::GoTo(time_s) => {
                 if let Some(playback) = &mut self.playback {
                     playback.plays = false;
@@ -64,14 +89,33 @@ impl Session {
                     playback.speed = speed;
                 }
             }
+            RunIntent::Recompute(index, what) => self.recompute(index, what),
+            RunIntent::CancelRecompute => self.cancel_recompute(),
             RunIntent::SaveReport => self.ask_for_path(Purpose::SaveRunReport),
             RunIntent::WriteReport { path, replace } => {
                 if let Some(playback) = &self.playback {
-                    let other = playback.compared.as_ref().map(|run| (run, playback.shift_s()));
-                    write(&self.outbox, path, replace, html(&playback.run, other));
+                    write(&self.outbox, path, replace, html(playback));
+                }
+            }
+            RunIntent::SaveTable => self.ask_for_path(Purpose::SaveRunTable),
+            RunIntent::WriteTable { path, replace } => {
+                if let Some(playback) = &self.playback {
+                    let runs = playback.runs().iter().map(|shown| &shown.run);
+                    write(&self.outbox, path, replace, run_table::csv(runs));
                 }
             }
             RunIntent::Close => self.close_run(),
+        }
+    }
+
+    fn play_run(&mut self, plays: bool) {
+        if let Some(playback) = &mut self.playback {
+            // From the end it begins anew.
+            if plays && playback.at_s >= playback.run().duration_s() {
+                playback.go_to(0.0);
+            }
+            playback.plays = plays;
+            self.played = Some(Instant::now());
         }
     }
 
@@ -88,9 +132,12 @@ impl Session {
             Ok(run) => *run,
             Err(why) => return self.notes.add(Severity::Error, why),
         };
+        let moves_parts = self.has_scene_of(&run);
         if read.compare {
-            if let Some(playback) = &mut self.playback {
-                playback.compared = Some(run);
+            // More may have been opened at once than are shown.
+            if let Some(playback) = self.playback.as_mut().filter(|p| p.runs().len() < MOST_RUNS) {
+                playback.push(run, moves_parts);
+                self.keep_poses();
             }
             return;
         }
@@ -100,7 +147,6 @@ impl Session {
         }
         self.close_run();
         self.note_project();
-        let moves_parts = self.has_scene_of(&run);
         let name = run.name();
         self.notes.add(
             Severity::Info,
@@ -113,10 +159,16 @@ impl Session {
                 )
             },
         );
-        self.before_run =
-            (self.document.as_ref().filter(|_| moves_parts)).map(|document| document.poses.clone());
         self.playback = Some(Playback::new(run, moves_parts));
+        self.keep_poses();
         self.show_frame();
+    }
+
+    /// Keeps where the parts are once a run moves them, to put them back when it is closed.
+    fn keep_poses(&mut self) {
+        if self.replays() && self.before_run.is_none() {
+            self.before_run = self.document.as_ref().map(|document| document.poses.clone());
+        }
     }
 
     /// Whether the open document's collision model is one that was on the board.
@@ -156,10 +208,15 @@ impl Session {
         let (Some(playback), Some(document)) = (&self.playback, &mut self.document) else {
             return;
         };
-        if !playback.moves_parts {
+        // Parts that another run has moved, and this one does not, are where they were before.
+        match &self.before_run {
+            Some(before) if before.len() == document.poses.len() => document.poses.clone_from(before),
+            _ => return,
+        }
+        if !playback.shown().moves_parts {
             return;
         }
-        for (part, pose) in playback.run.poses(playback.at_s) {
+        for (part, pose) in playback.run().poses(playback.at_s) {
             if let Some(shown) = document
                 .model_part(part)
                 .and_then(|part| document.poses.get_mut(part))

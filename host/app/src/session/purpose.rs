@@ -17,6 +17,8 @@ pub enum Purpose {
     CompareRun,
     /// The file for a report of recorded runs.
     SaveRunReport,
+    /// The file for a table of the figures of recorded runs.
+    SaveRunTable,
     /// Firmware for a board to open.
     OpenFirmware,
     /// The description of a rig to open.
@@ -33,11 +35,12 @@ impl Purpose {
         match self {
             Self::OpenModel => "Open STEP file or project",
             Self::SaveProject => "Save project as",
-            Self::SaveTraces => "Export traces as CSV",
+            Self::SaveTraces => "Export traces as CSV or SVG",
             Self::SaveSteps => "Save report of the steps as",
             Self::OpenRun => "Open recorded run",
             Self::CompareRun => "Compare with recorded run",
             Self::SaveRunReport => "Save report of the runs as",
+            Self::SaveRunTable => "Save figures of the runs as CSV",
             Self::OpenFirmware => "Choose firmware for the board",
             Self::OpenRig => "Open description of a rig",
             Self::SaveRig => "Save description of the rig as",
@@ -60,6 +63,7 @@ impl Purpose {
             Self::SaveTraces => "/folder/traces.csv",
             Self::SaveProject => "/folder/assembly.mortise",
             Self::SaveRunReport => "/folder/run-1.html",
+            Self::SaveRunTable => "/folder/runs.csv",
             Self::SaveSteps => "/folder/assembly.html",
             Self::OpenFirmware => "/folder/nucleo-h743zi",
             Self::OpenRig | Self::SaveRig => "/folder/rig.toml",
@@ -73,6 +77,7 @@ impl Purpose {
         match self {
             Self::OpenModel | Self::OpenFirmware | Self::OpenRig | Self::OpenRun | Self::CompareRun => "",
             Self::SaveRunReport => "run.html",
+            Self::SaveRunTable => "runs.csv",
             Self::SaveSteps => "assembly.html",
             Self::SaveRig => "rig.toml",
             Self::SaveRigReport => "commissioning.md",
@@ -88,7 +93,8 @@ impl Purpose {
                 "STEP files and projects",
                 &["step", "stp", "STEP", "STP", "p21", "mortise"],
             ),
-            Self::SaveTraces => ("CSV", &["csv"]),
+            Self::SaveTraces => ("CSV or SVG", &["csv", "svg"]),
+            Self::SaveRunTable => ("CSV", &["csv"]),
             Self::SaveProject => ("Mortise projects", &["mortise"]),
             Self::SaveRunReport | Self::SaveSteps => ("Pages", &["html"]),
             // What the linker makes has no ending.

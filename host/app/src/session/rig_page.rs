@@ -12,21 +12,9 @@ use super::readings::ReadingsWatch;
 /// Time that the traces of the encoders keep, s.
 pub const TRACE_S: f64 = 10.0;
 
-/// What the window does in its middle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Workspace {
-    /// The parts.
-    #[default]
-    Assemble,
-    /// The description of the rig and its commissioning.
-    Rig,
-}
-
 /// An action of the operator on the page on the rig.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RigIntent {
-    /// Show a workspace.
-    Show(Workspace),
     /// Replace the text by the description that the board keeps.
     Read,
     /// Replace the text by an example.
@@ -154,8 +142,6 @@ pub struct Checked {
 /// See the module.
 #[derive(Default)]
 pub struct RigPage {
-    /// What the window shows in its middle.
-    pub workspace: Workspace,
     text: String,
     checked: Option<Result<Box<Checked>, String>>,
     /// The description that the board keeps, and whether it uses it; `None`: not read yet.

@@ -11,6 +11,9 @@ use super::history::{History, Sample};
 /// Contact force from which parts touch, N.
 const TOUCH_N: f32 = 0.05;
 
+/// Longest time between a tick and the nearest sample of telemetry, s.
+const AROUND_S: f64 = 0.5;
+
 /// Figures of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
@@ -38,6 +41,10 @@ pub struct Run {
     duration_s: f64,
     /// Checksums of the collision models that were on the board.
     pub scenes: Vec<u32>,
+    /// Ticks at which the board began to count, and the times, s.
+    starts: Vec<(u32, f64)>,
+    newest_tick: Option<u32>,
+    tick_hz: u16,
     /// Time of the first touch, s.
     pub touch_s: Option<f64>,
     /// Its figures.
@@ -53,15 +60,15 @@ impl Run {
         let recording = Recording::open(path).map_err(|error| error.to_string())?;
         let mut run = Self {
             path: path.to_owned(),
+            tick_hz: 1_000,
             ..Self::default()
         };
-        let mut tick_hz = 1_000;
         let mut start = None;
         for entry in recording.entries() {
             match entry.kind {
-                EntryKind::Telemetry(sample) => run.add(&sample, tick_hz, &mut start),
+                EntryKind::Telemetry(sample) => run.add(&sample, &mut start),
                 EntryKind::Received(FromDevice::Capabilities(can)) => {
-                    tick_hz = can.tick_hz.max(1);
+                    run.tick_hz = can.tick_hz.max(1);
                     run.scenes.extend(can.scene);
                 }
                 EntryKind::Sent(_, ToDevice::SceneBegin { crc, .. }) => run.scenes.push(crc),
@@ -77,13 +84,17 @@ impl Run {
         }
     }
 
-    fn add(&mut self, telemetry: &Telemetry, tick_hz: u16, start: &mut Option<f64>) {
-        let mut sample = Sample::of(telemetry, tick_hz);
+    fn add(&mut self, telemetry: &Telemetry, start: &mut Option<f64>) {
+        let mut sample = Sample::of(telemetry, self.tick_hz);
         sample.time_s -= *start.get_or_insert(sample.time_s);
         self.history.add(sample);
         // The history's time goes on where the board started again.
         let time_s = self.history.newest().map_or(0.0, |newest| newest.time_s);
         self.duration_s = time_s;
+        if self.newest_tick.is_none_or(|newest| telemetry.tick < newest) {
+            self.starts.push((telemetry.tick, time_s));
+        }
+        self.newest_tick = Some(telemetry.tick);
         if let Some((part, pose)) = telemetry.object {
             self.parts.entry(part).or_default().push((time_s, pose));
         }
@@ -117,6 +128,19 @@ impl Run {
         self.duration_s
     }
 
+    /// Time at which the board computed a tick, s; `None` if it is not in the run.
+    pub fn time_of(&self, tick: u32) -> Option<f64> {
+        let ends = self.starts.iter().skip(1).map(|(_, begins_s)| *begins_s);
+        let ends = ends.chain([self.duration_s]);
+        (self.starts.iter().zip(ends)).find_map(|(&(first, begins_s), end_s)| {
+            let since = f64::from(tick) - f64::from(first);
+            let time_s = begins_s + since / f64::from(self.tick_hz.max(1));
+            // Telemetry begins, and ends, within this time of the ticks.
+            let is_in = (begins_s - AROUND_S..=end_s + AROUND_S).contains(&time_s);
+            is_in.then(|| time_s.clamp(0.0, self.duration_s))
+        })
+    }
+
     /// Where each part was that was ever held, by its number in the collision model: where it was held last, or before that where it was held first.
     pub fn poses(&self, time_s: f64) -> impl Iterator<Item = (u16, WirePose)> {
         self.parts.iter().filter_map(move |(&part, poses)| {
@@ -130,98 +154,6 @@ impl Run {
     pub fn name(&self) -> String {
         let name = self.path.file_name().unwrap_or(self.path.as_os_str());
         name.to_string_lossy().into_owned()
-    }
-}
-
-/// An action of the operator on recorded runs.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RunIntent {
-    /// Ask for the file of a run to show.
-    Browse,
-    /// Show a run.
-    Open(PathBuf),
-    /// Ask for the file of a run to compare with.
-    BrowseOther,
-    /// Compare with a run.
-    Compare(PathBuf),
-    /// Let it go on, or hold it.
-    Play(bool),
-    /// Go to a time, s.
-    GoTo(f64),
-    /// Seconds of the run in a second.
-    Speed(f64),
-    /// Ask where to write a report.
-    SaveReport,
-    /// Write a report of the runs that are shown.
-    WriteReport {
-        /// File to write.
-        path: PathBuf,
-        /// Whether an existing file may be replaced.
-        replace: bool,
-    },
-    /// Show no run any more.
-    Close,
-}
-
-/// A run that was read.
-pub struct RunRead {
-    /// Whether it is to be compared with the run that is shown.
-    pub compare: bool,
-    /// The run, or one line with the reason why there is none.
-    pub result: Result<Box<Run>, String>,
-}
-
-/// A run that is shown, and where it is.
-#[derive(Clone, Debug)]
-pub struct Playback {
-    /// The run.
-    pub run: Run,
-    /// Another run, to compare with.
-    pub compared: Option<Run>,
-    /// Present time in the run, s.
-    pub at_s: f64,
-    /// Whether it goes on by itself.
-    pub plays: bool,
-    /// Seconds of the run in a second.
-    pub speed: f64,
-    /// Whether the open document has the collision model of the run, so that its parts are moved.
-    pub moves_parts: bool,
-}
-
-impl Playback {
-    /// A run from its beginning.
-    pub fn new(run: Run, moves_parts: bool) -> Self {
-        Self {
-            run,
-            compared: None,
-            at_s: 0.0,
-            plays: false,
-            speed: 1.0,
-            moves_parts,
-        }
-    }
-
-    /// Goes to a time, s, within the run.
-    pub fn go_to(&mut self, time_s: f64) {
-        let time_s = if time_s.is_finite() { time_s } else { 0.0 };
-        self.at_s = time_s.clamp(0.0, self.run.duration_s());
-    }
-
-    /// Time has passed, s; stops at the end.
-    pub fn pass(&mut self, seconds: f64) {
-        if self.plays {
-            self.go_to(self.at_s + seconds * self.speed);
-            self.plays = self.at_s < self.run.duration_s();
-        }
-    }
-
-    /// Added to times of the compared run so that both touch first at the same time, s; without a touch they begin together.
-    pub fn shift_s(&self) -> f64 {
-        let touches = self.compared.as_ref().and_then(|run| run.touch_s);
-        self.run
-            .touch_s
-            .zip(touches)
-            .map_or(0.0, |(own, other)| own - other)
     }
 }
 
@@ -255,26 +187,16 @@ mod tests {
     }
 
     fn run(first: u32, touch: u32) -> Run {
-        let mut run = Run::default();
+        let mut run = Run {
+            tick_hz: 1_000,
+            ..Run::default()
+        };
         let mut start = None;
         for step in 0..200 {
             let contact = if step >= touch { 2.0 } else { 0.0 };
-            run.add(&sample(first + 10 * step, contact), 1_000, &mut start);
+            run.add(&sample(first + 10 * step, contact), &mut start);
         }
         run
-    }
-
-    #[test]
-    fn runs_are_aligned_by_their_first_touch() {
-        let (own, other) = (run(5_000, 80), run(90_000, 30));
-        assert!((own.touch_s.expect("touches") - 0.8).abs() < 1e-9);
-        assert!((own.duration_s() - 1.99).abs() < 1e-9);
-        assert_eq!(own.figures.contact_n, 2.0);
-        let mut playback = Playback::new(own, true);
-        playback.compared = Some(other);
-        assert!((playback.shift_s() - 0.5).abs() < 1e-9);
-        playback.compared = Some(run(0, 1_000));
-        assert_eq!(playback.shift_s(), 0.0, "it never touches");
     }
 
     #[test]
@@ -288,7 +210,7 @@ mod tests {
         for step in 200..300 {
             let mut later = sample(5_000 + 10 * step, 0.0);
             later.object = Some((4, later.handle));
-            run.add(&later, 1_000, &mut Some(5.0));
+            run.add(&later, &mut Some(5.0));
         }
         for (time, one, other) in [
             (-1.0, 5.0, 7.0),
@@ -304,23 +226,16 @@ mod tests {
     }
 
     #[test]
-    fn play_goes_on_at_its_speed_and_stops_at_the_end() {
-        let mut playback = Playback::new(run(5_000, 80), true);
-        playback.go_to(f64::NAN);
-        playback.pass(1.0);
-        assert_eq!(playback.at_s, 0.0, "it does not play");
-        (playback.plays, playback.speed) = (true, 0.5);
-        playback.pass(1.0);
-        assert!((playback.at_s - 0.5).abs() < 1e-9 && playback.plays);
-        playback.pass(100.0);
-        assert!(!playback.plays && (playback.at_s - 1.99).abs() < 1e-9);
-    }
-
-    #[test]
     fn a_board_that_started_again_goes_on_behind_what_was() {
         let mut run = run(5_000, 80);
-        run.add(&sample(3, 0.0), 1_000, &mut Some(5.0));
-        assert!(run.duration_s() > 1.99);
+        let ended = run.duration_s();
+        run.add(&sample(3, 0.0), &mut Some(5.0));
+        assert!(run.duration_s() > ended);
+        // Times of ticks before and after it.
+        let near = |tick, time: f64| (run.time_of(tick).expect("in the run") - time).abs() < 1e-9;
+        assert!(near(5_000, 0.0) && near(5_995, 0.995) && near(3, run.duration_s()));
+        assert_eq!(run.time_of(8_000), None);
+        assert_eq!(Run::default().time_of(0), None);
         assert!(run.parts[&1].is_sorted_by(|a, b| a.0 <= b.0));
     }
 }

@@ -12,8 +12,9 @@ use super::introduction::RigSent;
 use super::link::Command;
 use super::notes::Severity;
 use super::purpose::Purpose;
-use super::rig_page::{RigIntent, Workspace};
+use super::rig_page::RigIntent;
 use super::state::Session;
+use super::workspace::Workspace;
 
 /// Force of a motor's test at the handle, N.
 const TEST_N: f32 = 1.0;
@@ -24,7 +25,7 @@ impl Session {
     /// Why an action of the page is not possible now, as a sentence.
     pub(super) fn no_rig_action(&self, intent: &RigIntent) -> Option<String> {
         let reason = match intent {
-            RigIntent::Show(_) | RigIntent::Example(_) | RigIntent::Edit(_) => return None,
+            RigIntent::Example(_) | RigIntent::Edit(_) => return None,
             RigIntent::Browse | RigIntent::Load(_) | RigIntent::End => return None,
             RigIntent::SaveReport | RigIntent::WriteReport { .. } => match self.rig_page.steps {
                 Some(_) => return None,
@@ -103,7 +104,6 @@ impl Session {
 
     pub(super) fn perform_on_rig(&mut self, intent: RigIntent) {
         match intent {
-            RigIntent::Show(workspace) => self.show_workspace(workspace),
             RigIntent::Read => self.read_rig(),
             RigIntent::Example(number) => {
                 if let Some((_, text)) = EXAMPLES.get(number) {
@@ -199,16 +199,17 @@ impl Session {
         }
     }
 
-    fn show_workspace(&mut self, workspace: Workspace) {
-        self.rig_page.workspace = workspace;
+    /// Shows a workspace; that of the rig reads what the board has.
+    pub(super) fn show_workspace(&mut self, workspace: Workspace) {
+        self.workspace = workspace;
         self.watch_readings();
         self.show_board_rig();
     }
 
     /// Reads the description that the board keeps where the page shows it.
     pub(super) fn show_board_rig(&mut self) {
-        let page = &self.rig_page;
-        if page.workspace == Workspace::Rig && page.on_board.is_none() && self.connection().is_some() {
+        let is_shown = self.workspace == Workspace::Rig;
+        if is_shown && self.rig_page.on_board.is_none() && self.connection().is_some() {
             self.read_rig();
         }
     }
@@ -243,7 +244,7 @@ impl Session {
             .on_board
             .as_ref()
             .is_some_and(|(rig, in_use)| rig.is_some() && *in_use);
-        let watched = page.workspace == Workspace::Rig && is_described;
+        let watched = self.workspace == Workspace::Rig && is_described;
         if !watched {
             self.rig_page.watch = None;
         } else if self.rig_page.watch.is_none() {

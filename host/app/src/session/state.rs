@@ -15,6 +15,7 @@ use mortise_protocol::message::{DeviceState, Telemetry};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{RigEntry, RigSpec};
 
+use super::chart::TracesFile;
 use super::connections::Connections;
 use super::document::Document;
 use super::fits::FitChoice;
@@ -31,12 +32,13 @@ use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
 use super::recording::Recording;
 use super::rig_page::RigPage;
-use super::run::Playback;
+use super::runs::Playback;
 use super::sequencing::Sequencing;
 use super::threads::Cancel;
 use super::tour::Tour;
 use super::verdict::Verdict;
 use super::ways::Ways;
+use super::workspace::Workspace;
 use super::{pose, work};
 use crate::folder_cache::FolderCache;
 use crate::kept::Preferences;
@@ -116,11 +118,13 @@ pub struct Session {
     pub sequencing: Sequencing,
     /// The part with which fits are found; `None`: the nearest ones.
     pub partner: Option<usize>,
-    /// A recorded run that is shown.
+    /// Recorded runs that are shown.
     pub playback: Option<Playback>,
     /// Poses of the parts before it was shown, and when it was last let go on.
     pub(super) before_run: Option<Vec<DAffine3>>,
     pub(super) played: Option<Instant>,
+    /// What the window shows in its middle.
+    pub workspace: Workspace,
     /// The page on the rig.
     pub rig_page: RigPage,
     /// Firmware for a board.
@@ -139,8 +143,8 @@ pub struct Session {
     pub recordings: Option<PathBuf>,
     /// Set when this desktop offers no file dialog: the window asks for a path instead.
     pub wants_path: Option<Purpose>,
-    /// The table of traces that waits for the path of its file.
-    pub(super) table: Option<String>,
+    /// The traces that wait for the path of their file.
+    pub(super) table: Option<TracesFile>,
     /// Where results of bakes are kept.
     pub(super) cache: Option<Arc<FolderCache>>,
     /// What the user prefers.
@@ -198,6 +202,7 @@ impl Session {
             sequencing: Sequencing::default(),
             partner: None,
             ways: Ways::default(),
+            workspace: Workspace::default(),
             rig_page: RigPage::default(),
             flashing: Flashing::default(),
             joints: Joints::default(),
@@ -261,14 +266,14 @@ impl Session {
 
     /// The samples that the plots show: of a recorded run, or of the connected rig.
     pub fn shown_history(&self) -> &History {
-        (self.playback.as_ref()).map_or(&self.history, |playback| &playback.run.history)
+        (self.playback.as_ref()).map_or(&self.history, |playback| &playback.run().history)
     }
 
-    /// Whether a recorded run has the parts where they are.
+    /// Whether recorded runs have the parts where they are.
     pub fn replays(&self) -> bool {
         self.playback
             .as_ref()
-            .is_some_and(|playback| playback.moves_parts)
+            .is_some_and(|playback| playback.runs().iter().any(|shown| shown.moves_parts))
     }
 
     /// Whether the motors may exert force.

@@ -14,6 +14,11 @@ impl Cancel {
         self.0.store(true, Ordering::Relaxed);
     }
 
+    /// Whether both are one flag.
+    pub fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     /// The flag itself, for work that knows nothing of the window.
     pub fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.0)

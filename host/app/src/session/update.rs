@@ -90,6 +90,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         Update::Marked { models, mark } => session.marked(models, mark),
         Update::ProjectRead { path, result } => session.project_read(path, result),
         Update::Run(read) => session.run_read(read),
+        Update::Recompute(of, update) => session.recompute_update(&of, update),
         Update::Flashing(update) => session.flashed(update),
         Update::Joints(found) => session.joints.take_in(found),
         Update::Connections(found) => session.connections.take_in(found),

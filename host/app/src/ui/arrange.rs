@@ -1,15 +1,16 @@
-//! Choice of the panels shown: all of them in a large window, one at a time with tabs in a small one. The bar with STOP and the state is
-//! above either.
+//! Choice of the panels shown: all of them in a large window; in a smaller one a drawer beside the view, opened and closed by tabs; in a small one the view or one panel.
+//! The bar with STOP and the state is above any of them.
 
 use egui::{RichText, Ui, Vec2};
 
 use super::theme;
+use crate::session::workspace::Workspace;
 
 /// Smallest window size at which every panel is shown, points.
-const WIDE: Vec2 = Vec2::new(980.0, 560.0);
-/// Smallest window width at which one panel stands beside the view, points.
+const WIDE: Vec2 = Vec2::new(1200.0, 560.0);
+/// Smallest window width at which a drawer has space beside the view, points.
 const BESIDE: f32 = 620.0;
-/// Width of that panel, points.
+/// Smallest width of the drawer, points.
 const BESIDE_WIDTH: f32 = 300.0;
 
 /// Arrangement of the panels.
@@ -17,7 +18,7 @@ const BESIDE_WIDTH: f32 = 300.0;
 pub enum Arrangement {
     /// All panels around the view.
     Wide,
-    /// The view, and one panel of this width (points) beside it.
+    /// The view, and a drawer of this width (points) beside it.
     Beside(f32),
     /// The view or one panel.
     Single,
@@ -36,16 +37,15 @@ impl Arrangement {
     }
 }
 
-/// A panel that can be chosen where not all are shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What a tab shows where not all panels are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tab {
-    /// The 3D view.
-    #[default]
-    View,
+    /// The middle of the workspace alone.
+    Middle,
     /// The rig, hand, guidance and parameters.
     Rig,
-    /// The parts.
-    Parts,
+    /// The parts, or the runs that are analysed.
+    Left,
     /// The messages.
     Messages,
     /// The traces.
@@ -53,44 +53,56 @@ pub enum Tab {
 }
 
 impl Tab {
-    fn name(self) -> &'static str {
-        match self {
-            Self::View => "View",
-            Self::Rig => "Rig",
-            Self::Parts => "Parts",
-            Self::Messages => "Messages",
-            Self::Plots => "Plots",
-        }
-    }
+    const ALL: [Self; 5] = [Self::Middle, Self::Rig, Self::Left, Self::Messages, Self::Plots];
 
-    /// The tab shown under `arrangement`: beside the view, the view itself needs no tab.
-    pub fn under(self, arrangement: Arrangement) -> Self {
-        match (arrangement, self) {
-            (Arrangement::Beside(_), Self::View) => Self::Rig,
-            _ => self,
+    fn name(self, workspace: Workspace) -> &'static str {
+        match (self, workspace) {
+            (Self::Middle, Workspace::Rig) => "Set-up",
+            (Self::Middle, _) => "View",
+            (Self::Rig, _) => "Rig",
+            (Self::Left, Workspace::Analyse) => "Runs",
+            (Self::Left, _) => "Parts",
+            (Self::Messages, _) => "Messages",
+            (Self::Plots, _) => "Plots",
         }
     }
 }
 
-/// Draws the tabs; a click changes `chosen`.
-pub fn tabs(ui: &mut Ui, arrangement: Arrangement, chosen: &mut Tab) {
-    let all = [Tab::View, Tab::Rig, Tab::Parts, Tab::Messages, Tab::Plots];
-    let first = usize::from(matches!(arrangement, Arrangement::Beside(_)));
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = Vec2::new(2.0, 2.0);
-        ui.spacing_mut().button_padding = Vec2::new(7.0, 2.0);
-        for tab in all.into_iter().skip(first) {
-            let text = RichText::new(tab.name())
-                .size(12.5)
-                .color(theme::of(ui).text_strong);
-            let button = egui::Button::selectable(*chosen == tab, text);
-            // The accessible names differ from the headings of the panels.
-            let named = format!("Show {}", tab.name());
-            if ui.add(button).accessible_name(named).clicked() {
-                *chosen = tab;
+/// The tab that is chosen.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tabs {
+    /// `None`: none was chosen yet.
+    chosen: Option<Tab>,
+}
+
+impl Tabs {
+    /// The chosen tab. At the start, a drawer has the rig.
+    pub fn chosen(self, arrangement: Arrangement) -> Tab {
+        self.chosen.unwrap_or(match arrangement {
+            Arrangement::Beside(_) => Tab::Rig,
+            Arrangement::Wide | Arrangement::Single => Tab::Middle,
+        })
+    }
+
+    /// Draws the tabs. A click opens what the tab shows; one on the open drawer's tab closes it.
+    pub fn show(&mut self, ui: &mut Ui, arrangement: Arrangement, workspace: Workspace) {
+        let chosen = self.chosen(arrangement);
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = Vec2::new(2.0, 2.0);
+            ui.spacing_mut().button_padding = Vec2::new(7.0, 2.0);
+            for tab in Tab::ALL {
+                let name = tab.name(workspace);
+                let text = RichText::new(name).size(12.5).color(theme::of(ui).text_strong);
+                let button = egui::Button::selectable(chosen == tab, text);
+                // The accessible names differ from the headings of the panels.
+                let named = format!("Show {name}");
+                if ui.add(button).accessible_name(named).clicked() {
+                    let closes = chosen == tab && matches!(arrangement, Arrangement::Beside(_));
+                    self.chosen = Some(if closes { Tab::Middle } else { tab });
+                }
             }
-        }
-    });
+        });
+    }
 }
 
 #[cfg(test)]
@@ -105,7 +117,7 @@ mod tests {
             Arrangement::Beside(300.0)
         );
         assert_eq!(Arrangement::of(Vec2::new(266.0, 200.0)), Arrangement::Single);
-        assert_eq!(Tab::View.under(Arrangement::Beside(300.0)), Tab::Rig);
-        assert_eq!(Tab::View.under(Arrangement::Single), Tab::View);
+        assert_eq!(Tabs::default().chosen(Arrangement::Beside(300.0)), Tab::Rig);
+        assert_eq!(Tabs::default().chosen(Arrangement::Single), Tab::Middle);
     }
 }

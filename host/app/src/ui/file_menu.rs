@@ -3,7 +3,7 @@
 use egui::{Button, Shape, Stroke, Ui, Vec2};
 
 use super::{control, recent, theme};
-use crate::session::rig_page::{RigIntent, Workspace};
+use crate::session::workspace::Workspace;
 use crate::session::{Intent, Session};
 
 /// Draws the button that opens the menu.
@@ -17,13 +17,14 @@ pub fn show(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<In
         if control::intent_button(ui, session, wanted, save, Intent::SaveProject, hint).clicked() {
             ui.close();
         }
-        let (workspace, text) = match session.rig_page.workspace {
-            Workspace::Assemble => (Workspace::Rig, "Show the rig's set-up"),
-            Workspace::Rig => (Workspace::Assemble, "Show the parts"),
-        };
-        if ui.add(Button::new(text).frame(false)).clicked() {
-            wanted.push(Intent::Rig(RigIntent::Show(workspace)));
-            ui.close();
+        let others = Workspace::ALL.into_iter();
+        for workspace in others.filter(|workspace| *workspace != session.workspace) {
+            let text = format!("Workspace {}", workspace.name());
+            let button = ui.add(Button::new(text).frame(false));
+            if button.on_hover_text(workspace.hint()).clicked() {
+                wanted.push(Intent::Show(workspace));
+                ui.close();
+            }
         }
         let keys = Button::new("Keys").frame(false);
         if ui.add(keys).on_hover_text("What the keys and the pointer do (F1)").clicked() {

@@ -4,7 +4,7 @@ use egui::{Align, Layout, RichText, Ui, Vec2};
 use mortise_protocol::message::DeviceState;
 use mortise_rig::describe;
 
-use super::{control, file_menu, rig_page, stop, theme, undo};
+use super::{control, file_menu, stop, theme, undo, workspaces};
 use crate::session::link::Link;
 use crate::session::{Intent, Session};
 
@@ -105,8 +105,8 @@ fn file(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<Intent
     if session.document.is_some() && ui.available_width() > 2.0 * (undo::WIDTH + GAP) {
         undo::show(ui, session, wanted, height);
     }
-    if ui.available_width() > rig_page::SWITCH + 60.0 {
-        rig_page::switch(ui, session, wanted, height);
+    if ui.available_width() > workspaces::WIDTH + 60.0 {
+        workspaces::show(ui, session, wanted, height);
         ui.spacing_mut().item_spacing.x = GAP;
     }
     if ui.available_width() > 40.0 {

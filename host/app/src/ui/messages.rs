@@ -16,11 +16,12 @@ pub fn color(palette: &theme::Palette, severity: Severity) -> Color32 {
     }
 }
 
-/// Draws the list.
-pub fn show(ui: &mut Ui, session: &mut Session) {
+/// Draws the list; `beside` is drawn at the right end of its heading.
+pub fn show(ui: &mut Ui, session: &mut Session, beside: impl FnOnce(&mut Ui)) {
     ui.horizontal(|ui| {
         control::section(ui, "Messages");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            beside(ui);
             if session.notes.iter().len() > 0 {
                 let button = egui::Button::new(RichText::new("Clear").small().color(theme::of(ui).text_weak))
                     .frame(false);

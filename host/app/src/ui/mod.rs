@@ -5,6 +5,7 @@ pub mod app;
 mod appearance;
 mod arrange;
 mod below;
+mod bottom;
 mod cards;
 mod clearances;
 mod command;
@@ -39,6 +40,7 @@ pub mod plots;
 mod recent;
 mod rig;
 mod rig_page;
+mod runs;
 mod section;
 mod sequence;
 #[cfg(unix)]
@@ -48,14 +50,15 @@ pub mod theme;
 mod undo;
 mod view;
 mod way;
+mod workspaces;
 
 use std::time::{Duration, Instant};
 
 use egui::{Key, Modifiers, Ui};
 
-use self::arrange::Arrangement;
+use self::arrange::{Arrangement, Tab};
 use crate::session::link::Link;
-use crate::session::rig_page::Workspace;
+use crate::session::workspace::Workspace;
 use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 use crate::viewport::surface::Surface;
@@ -79,7 +82,7 @@ pub struct Window {
     /// Viewpoint of the 3D view.
     pub view: Viewpoint,
     path: open::PathDialog,
-    tab: arrange::Tab,
+    tabs: arrange::Tabs,
     /// What is searched for in the list of parts.
     search: String,
     /// What the plots show.
@@ -87,6 +90,7 @@ pub struct Window {
     below: below::Below,
     command: command::CommandLine,
     motion: motion::Fields,
+    runs: runs::Fields,
     help: keys::Help,
     /// A six-axis device, if one is followed.
     #[cfg(unix)]
@@ -104,12 +108,13 @@ impl Window {
             session,
             view: Viewpoint::default(),
             path: open::PathDialog::default(),
-            tab: arrange::Tab::default(),
+            tabs: arrange::Tabs::default(),
             search: String::new(),
             plots,
             below: below::Below::default(),
             command: command::CommandLine::default(),
             motion: motion::Fields::default(),
+            runs: runs::Fields::default(),
             help: keys::Help::default(),
             #[cfg(unix)]
             space_mouse: None,
@@ -214,38 +219,32 @@ impl Window {
 
     /// Draws every panel around the view.
     fn wide(&mut self, ui: &mut Ui, surface: Option<&mut Surface>, wanted: &mut Vec<Intent>) {
-        let session = &mut self.session;
-        let side = |left, right| {
-            egui::Frame::NONE.inner_margin(egui::Margin {
-                left,
-                right,
-                ..Default::default()
-            })
-        };
-        egui::Panel::bottom("below")
-            .default_size(216.0)
-            .size_range(140.0..=420.0)
-            .frame(theme::panel(theme::of(ui)))
-            .show(ui, |ui| {
-                egui::Panel::right("messages")
-                    .default_size(400.0)
-                    .size_range(220.0..=700.0)
-                    .frame(side(14, 0))
-                    .show(ui, |ui| messages::show(ui, session));
-                egui::CentralPanel::default()
-                    .frame(side(0, 14))
-                    .show(ui, |ui| plots::show(ui, session, &mut self.plots, wanted));
-            });
-        if session.rig_page.workspace == Workspace::Assemble {
-            self.parts(ui, wanted);
+        if self.session.workspace == Workspace::Analyse {
+            // Runs are analysed without a rig, and their list is as high as the window.
+            self.runs(ui, wanted);
+            bottom::show(ui, &mut self.session, &mut self.plots, wanted);
+        } else {
+            bottom::show(ui, &mut self.session, &mut self.plots, wanted);
+            if self.session.workspace == Workspace::Assemble {
+                self.parts(ui, wanted);
+            }
+            let session = &self.session;
+            egui::Panel::right("rig")
+                .exact_size(336.0)
+                .resizable(false)
+                .frame(theme::panel(theme::of(ui)))
+                .show(ui, |ui| rig::show(ui, session, wanted));
         }
-        let session = &mut self.session;
-        egui::Panel::right("rig")
-            .exact_size(336.0)
-            .resizable(false)
-            .frame(theme::panel(theme::of(ui)))
-            .show(ui, |ui| rig::show(ui, session, wanted));
         self.picture(ui, surface, wanted);
+    }
+
+    /// Draws the panel of runs at the left.
+    fn runs(&mut self, ui: &mut Ui, wanted: &mut Vec<Intent>) {
+        egui::Panel::left("runs")
+            .default_size(420.0)
+            .size_range(260.0..=700.0)
+            .frame(theme::panel(theme::of(ui)))
+            .show(ui, |ui| runs::show(ui, &self.session, &mut self.runs, wanted));
     }
 
     /// Draws the panel of parts at the left.
@@ -272,7 +271,7 @@ impl Window {
             });
     }
 
-    /// Draws one panel at a time.
+    /// Draws the view and a drawer, or one panel at a time.
     fn compact(
         &mut self,
         ui: &mut Ui,
@@ -280,40 +279,40 @@ impl Window {
         surface: Option<&mut Surface>,
         wanted: &mut Vec<Intent>,
     ) {
-        self.tab = self.tab.under(arrangement);
         let tight = theme::panel(theme::of(ui)).inner_margin(egui::Margin::symmetric(8, 6));
-        if let Arrangement::Beside(width) = arrangement {
-            egui::Panel::right("beside")
-                .exact_size(width)
-                .resizable(false)
-                .frame(tight)
-                .show(ui, |ui| {
-                    arrange::tabs(ui, arrangement, &mut self.tab);
-                    self.panel(ui, wanted);
-                });
-            self.picture(ui, surface, wanted);
-            return;
-        }
         egui::Panel::top("tabs")
             .resizable(false)
             .frame(tight)
-            .show(ui, |ui| arrange::tabs(ui, arrangement, &mut self.tab));
-        if self.tab == arrange::Tab::View {
-            self.picture(ui, surface, wanted);
-        } else {
-            egui::CentralPanel::default()
-                .frame(tight)
-                .show(ui, |ui| self.panel(ui, wanted));
+            .show(ui, |ui| self.tabs.show(ui, arrangement, self.session.workspace));
+        let tab = self.tabs.chosen(arrangement);
+        match arrangement {
+            _ if tab == Tab::Middle => self.picture(ui, surface, wanted),
+            Arrangement::Beside(width) => {
+                egui::Panel::right("drawer")
+                    .exact_size(width)
+                    .resizable(false)
+                    .frame(tight)
+                    .show(ui, |ui| self.panel(ui, tab, wanted));
+                self.picture(ui, surface, wanted);
+            }
+            Arrangement::Wide | Arrangement::Single => {
+                egui::CentralPanel::default()
+                    .frame(tight)
+                    .show(ui, |ui| self.panel(ui, tab, wanted));
+            }
         }
     }
 
-    /// Draws the chosen panel.
-    fn panel(&mut self, ui: &mut Ui, wanted: &mut Vec<Intent>) {
+    /// Draws the panel of a tab.
+    fn panel(&mut self, ui: &mut Ui, tab: Tab, wanted: &mut Vec<Intent>) {
         let session = &mut self.session;
-        match self.tab {
-            arrange::Tab::View => {}
-            arrange::Tab::Rig => rig::show(ui, session, wanted),
-            arrange::Tab::Parts => {
+        match tab {
+            Tab::Middle => {}
+            Tab::Rig => rig::show(ui, session, wanted),
+            Tab::Left if session.workspace == Workspace::Analyse => {
+                runs::show(ui, session, &mut self.runs, wanted);
+            }
+            Tab::Left => {
                 self.below.show(ui, session, &mut self.view, wanted);
                 parts::show(
                     ui,
@@ -324,15 +323,15 @@ impl Window {
                     wanted,
                 );
             }
-            arrange::Tab::Messages => messages::show(ui, session),
-            arrange::Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),
+            Tab::Messages => messages::show(ui, session, |_| {}),
+            Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),
         }
     }
 
     /// Draws the view and its overlays, or the page on the rig.
     fn picture(&mut self, ui: &mut Ui, surface: Option<&mut Surface>, wanted: &mut Vec<Intent>) {
         let session = &mut self.session;
-        if session.rig_page.workspace == Workspace::Rig {
+        if session.workspace == Workspace::Rig {
             egui::CentralPanel::default()
                 .frame(theme::panel(theme::of(ui)))
                 .show(ui, |ui| rig_page::show(ui, session, wanted));

@@ -179,7 +179,7 @@ fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parame
 }
 
 /// Words of a parameter's name: `CouplingAngularDamping` becomes `Coupling angular damping`.
-fn words(name: &str) -> String {
+pub fn words(name: &str) -> String {
     let mut text = String::new();
     for c in name.chars() {
         if c.is_uppercase() && !text.is_empty() {

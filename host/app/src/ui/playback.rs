@@ -1,10 +1,11 @@
-//! The line above the plots for a recorded run: play, scrub, speed, comparison and figures.
+//! The line above the plots for recorded runs: play, scrub, speed, comparison, and figures where the panel of runs is not shown.
 
 use egui::{RichText, Slider, Ui, Vec2};
 
 use super::{control, theme};
-use crate::session::run::RunIntent;
-use crate::session::run::{Figures, Playback, Run};
+use crate::session::run::{Figures, Run};
+use crate::session::runs::{Playback, RunIntent};
+use crate::session::workspace::Workspace;
 use crate::session::{Intent, Session};
 
 /// Speeds that can be chosen.
@@ -27,7 +28,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             .accessible_name(format!("{text} the run"));
         let mut at = playback.at_s;
         ui.spacing_mut().slider_width = (0.35 * ui.available_width()).clamp(60.0, 420.0);
-        let slider = Slider::new(&mut at, 0.0..=playback.run.duration_s())
+        let slider = Slider::new(&mut at, 0.0..=playback.run().duration_s())
             .suffix(" s")
             // A fixed number of decimals would round the time itself, as if the slider had been moved.
             .custom_formatter(|time, _| format!("{time:.2}"));
@@ -37,7 +38,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         }
         slider.accessible_name("Time in the run");
         speeds(ui, playback, wanted);
-        let hint = "Draw another run beside this one, dashed and aligned by the first touch";
+        let hint = "Draw another run beside this one, dashed and aligned by the first touch; Analyse shows the figures of all";
         let compare = Intent::Run(RunIntent::BrowseOther);
         control::intent_button(ui, session, wanted, small("Compare…"), compare, hint);
         let hint = "Write figures and traces of the runs to a page (HTML) that needs no other file";
@@ -49,9 +50,11 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         control::intent_button(ui, session, wanted, small("Close"), close, hint)
             .accessible_name("Close the run");
     });
-    figures(ui, &playback.run);
-    if let Some(other) = &playback.compared {
-        figures(ui, other);
+    if session.workspace != Workspace::Analyse {
+        figures(ui, playback.run());
+        for (_, other, _) in playback.others() {
+            figures(ui, other);
+        }
     }
 }
 

@@ -2,14 +2,11 @@
 
 use egui::{ScrollArea, Ui, Vec2};
 
-use super::{commissioning, control, description, firmware, theme};
-use crate::session::rig_page::{RigIntent, Workspace};
+use super::{commissioning, control, description, firmware};
 use crate::session::{Intent, Session};
 
 /// Width from which the two stand side by side, points.
 const SIDE_BY_SIDE: f32 = 640.0;
-/// Width of the two buttons that choose the workspace, points.
-pub const SWITCH: f32 = 150.0;
 
 /// Draws the page.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
@@ -56,26 +53,4 @@ fn scrolled(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {
                 draw(ui);
             });
         });
-}
-
-/// Draws the buttons that choose the workspace.
-pub fn switch(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
-    ui.spacing_mut().item_spacing.x = 2.0;
-    for (workspace, name, hint) in [
-        (Workspace::Assemble, "Assemble", "Show the parts"),
-        (
-            Workspace::Rig,
-            "Set up rig",
-            "Describe the rig, and try its encoders, stop button and motors one by one",
-        ),
-    ] {
-        let chosen = session.rig_page.workspace == workspace;
-        let text = egui::RichText::new(name)
-            .size(12.5)
-            .color(theme::of(ui).text_strong);
-        let button = egui::Button::selectable(chosen, text).min_size(Vec2::new(0.0, height));
-        if ui.add(button).on_hover_text(hint).clicked() {
-            wanted.push(Intent::Rig(RigIntent::Show(workspace)));
-        }
-    }
 }

@@ -104,10 +104,11 @@ fn check(harness: &mut Harness<'_, Window>, state: &str, what: &str) {
 #[test]
 fn stop_and_the_state_are_on_screen_in_the_workspace_for_the_rig() {
     use mortise::session::Intent;
-    use mortise::session::rig_page::{RigIntent, Workspace};
+    use mortise::session::rig_page::RigIntent;
+    use mortise::session::workspace::Workspace;
     let mut harness = harness();
     let session = &mut harness.state_mut().session;
-    session.act(Intent::Rig(RigIntent::Show(Workspace::Rig)));
+    session.act(Intent::Show(Workspace::Rig));
     session.act(Intent::Rig(RigIntent::Example(3)));
     session.act(Intent::Connect);
     until(&mut harness, "the description was read", |s| {
@@ -159,4 +160,52 @@ fn stop_works_in_the_smallest_window() {
     until(&mut harness, "stopped", |s| {
         s.device() == Some(mortise_protocol::message::DeviceState::Stopped)
     });
+}
+
+/// Below 1200 points a drawer holds the panels: a click on a tab opens it, one on the open tab closes it.
+#[test]
+fn under_1200_points_panels_are_in_a_drawer() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    resize(&mut harness, Vec2::new(1180.0, 800.0), 1.0);
+    let heading = |harness: &Harness<'_, Window>, text: &str| harness.query_all_by_label(text).count();
+    assert_eq!(heading(&harness, "Connect"), 1, "the rig is in the drawer");
+    click(&mut harness, "Show Parts");
+    assert_eq!(
+        [heading(&harness, "Search parts"), heading(&harness, "Connect")],
+        [1, 0]
+    );
+    click(&mut harness, "Show Parts");
+    assert_eq!(heading(&harness, "Search parts"), 0, "the drawer is closed");
+    click(&mut harness, "Analyse");
+    click(&mut harness, "Show Runs");
+    assert_eq!(heading(&harness, "Open a run"), 1);
+    click(&mut harness, "Assemble");
+    resize(&mut harness, Vec2::new(1230.0, 800.0), 1.0);
+    assert_eq!(
+        [heading(&harness, "Search parts"), heading(&harness, "Connect")],
+        [1, 1]
+    );
+}
+
+#[test]
+fn plots_and_messages_fold_to_the_newest_message() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let count = |harness: &Harness<'_, Window>, text: &str| harness.query_all_by_label(text).count();
+    assert_eq!(count(&harness, "Export…"), 1);
+    click(&mut harness, "Fold");
+    assert_eq!(count(&harness, "Export…"), 0);
+    let newest = harness
+        .state()
+        .session
+        .notes
+        .iter()
+        .next()
+        .expect("a message")
+        .text
+        .clone();
+    assert_eq!(count(&harness, &newest), 1);
+    click(&mut harness, "Plots and messages");
+    assert_eq!(count(&harness, "Export…"), 1);
 }

@@ -1,5 +1,6 @@
 //! Tests of the window, a module for each of its parts: one program, because linking the window takes longer than most of the tests.
 
+mod analyse;
 mod clearances;
 mod command_line;
 mod common;

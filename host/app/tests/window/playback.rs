@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mortise::session::link::Link;
-use mortise::session::run::RunIntent;
+use mortise::session::runs::{Playback, RunIntent};
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
 
@@ -33,7 +33,7 @@ fn act(harness: &mut Harness<'_, Window>, intent: RunIntent) {
     harness.run_steps(2);
 }
 
-fn shown(session: &Session) -> &mortise::session::run::Playback {
+fn shown(session: &Session) -> &Playback {
     session.playback.as_ref().expect("a run is shown")
 }
 
@@ -47,8 +47,8 @@ fn a_run_is_shown_scrubbed_played_compared_and_closed() {
     until(&mut harness, "the run is read", |s| s.playback.is_some());
     harness.run_steps(3);
     let playback = shown(&harness.state().session);
-    assert!(playback.moves_parts, "the file that was recorded is open");
-    let length = playback.run.duration_s();
+    assert!(playback.shown().moves_parts, "the file that was recorded is open");
+    let length = playback.run().duration_s();
     assert!(length > 2.0, "{length} s");
     // The slider moves the peg as it moved, and no part but that.
     let seen: Vec<f64> = [0.0, 0.5, 1.0]
@@ -77,10 +77,16 @@ fn a_run_is_shown_scrubbed_played_compared_and_closed() {
     assert!((shown(&harness.state().session).at_s - length).abs() < 1e-9);
     // Beside itself it touches at the same time.
     act(&mut harness, RunIntent::Compare(path));
-    until(&mut harness, "the other run", |s| shown(s).compared.is_some());
+    until(&mut harness, "the other run", |s| shown(s).runs().len() == 2);
     harness.run_steps(3);
-    assert_eq!(shown(&harness.state().session).shift_s(), 0.0);
-    let name = shown(&harness.state().session).run.name();
+    assert_eq!(
+        shown(&harness.state().session)
+            .others()
+            .next()
+            .map(|(.., shift)| shift),
+        Some(0.0)
+    );
+    let name = shown(&harness.state().session).run().name();
     let figures = harness.get_all_by_label_contains(&format!("{name}: ")).count();
     assert!(figures >= 2, "figures of both: {figures}");
     // Figures and traces of both go to a page.
@@ -123,7 +129,7 @@ fn a_run_of_another_model_moves_no_part_and_what_is_no_run_is_refused() {
     harness.state_mut().session.document = None;
     act(&mut harness, RunIntent::Open(path));
     until(&mut harness, "the run is read", |s| s.playback.is_some());
-    assert!(!shown(&harness.state().session).moves_parts);
+    assert!(!shown(&harness.state().session).shown().moves_parts);
     act(&mut harness, RunIntent::GoTo(1.0));
     // Connecting ends it.
     harness.state_mut().session.act(Intent::Connect);

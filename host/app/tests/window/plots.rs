@@ -187,7 +187,7 @@ fn the_path_of_an_export_is_typed_where_there_is_no_dialog() {
     click(&mut harness, "Export…");
     until(&mut harness, "a path is asked for", |s| s.wants_path.is_some());
     harness.run_steps(2);
-    harness.get_by_label("Export traces as CSV");
+    harness.get_by_label("Export traces as CSV or SVG");
     let field = harness.get_by_role(egui::accesskit::Role::TextInput);
     field.type_text(path.to_str().expect("text"));
     harness.run_steps(2);

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use mortise::session::rig_page::{RigIntent, Workspace};
+use mortise::session::rig_page::RigIntent;
+use mortise::session::workspace::Workspace;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
 use mortise_protocol::message::DeviceState;
@@ -21,7 +22,7 @@ fn described(example: &str) -> Harness<'static, Window> {
     let simulation = RigSpec::Simulated { realtime: true };
     assert_eq!(harness.state().session.chosen, simulation);
     click(&mut harness, "Set up rig");
-    assert_eq!(harness.state().session.rig_page.workspace, Workspace::Rig);
+    assert_eq!(harness.state().session.workspace, Workspace::Rig);
     let none = Intent::Rig(RigIntent::Send);
     assert_eq!(
         obstacle(&harness.state().session, &none).as_deref(),
@@ -174,7 +175,7 @@ fn a_rig_is_described_and_commissioned_from_first_to_last_step() {
     click(&mut harness, "End commissioning");
     assert!(harness.state().session.rig_page.steps.is_none());
     click(&mut harness, "Assemble");
-    assert_eq!(harness.state().session.rig_page.workspace, Workspace::Assemble);
+    assert_eq!(harness.state().session.workspace, Workspace::Assemble);
 }
 
 #[test]

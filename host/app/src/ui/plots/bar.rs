@@ -6,7 +6,7 @@ use super::scale;
 use super::view::View;
 use crate::session::history::Quantity;
 use crate::session::intent::Traces;
-use crate::session::run::RunIntent;
+use crate::session::runs::RunIntent;
 use crate::session::{Intent, Session};
 use crate::ui::{control, theme};
 
@@ -40,7 +40,7 @@ pub fn show(ui: &mut Ui, session: &Session, view: &mut View, wanted: &mut Vec<In
             range_s: view.range_s(),
             keys: view.keys(),
         };
-        let hint = "Write what is shown to a file of comma-separated values";
+        let hint = "Write what is shown to a file of comma-separated values, or to a picture (.svg)";
         control::intent_button(ui, session, wanted, small("Export…"), Intent::ExportTraces(traces), hint);
         record(ui, session, wanted);
         let hint = "Show a recorded run: its traces, and the parts as they moved";

@@ -1,12 +1,14 @@
 //! Traces of the loop's signals: live or held still, over seconds or minutes.
 
 mod bar;
+mod line;
 mod panel;
 mod scale;
 mod view;
 
 use egui::{ScrollArea, Ui, Vec2};
 
+pub use self::line::sample as line_sample;
 pub use self::view::View;
 use crate::session::history::{Quantity, Signal};
 use crate::session::{Intent, Session};
@@ -23,7 +25,7 @@ const SPACE: Vec2 = Vec2::new(26.0, 6.0);
 pub fn show(ui: &mut Ui, session: &Session, view: &mut View, wanted: &mut Vec<Intent>) {
     let history = session.shown_history();
     let run = session.playback.as_ref();
-    view.show_run(run.map(|playback| [playback.run.duration_s(), playback.at_s]));
+    view.show_run(run.map(|playback| [playback.run().duration_s(), playback.at_s]));
     let ends = history.oldest().zip(history.newest());
     view.follow(ends.map(|(oldest, newest)| [oldest.time_s, newest.time_s]));
     bar::show(ui, session, view, wanted);

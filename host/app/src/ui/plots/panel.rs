@@ -3,9 +3,11 @@
 use egui::{Color32, RichText, Ui, Vec2b};
 use egui_plot::{GridMark, HLine, Plot, PlotPoints, VLine};
 
+use super::line;
 use super::scale::{self, Scale};
 use super::view::View;
 use crate::session::Session;
+use crate::session::chart::beside;
 use crate::session::history::{Line, Quantity, Signal, envelope};
 use crate::ui::{rig, theme};
 
@@ -19,8 +21,8 @@ struct Trace {
     signal: &'static Signal,
     color: Color32,
     lines: Vec<Line>,
-    /// The same of a run to compare with, at the times of the run that is shown.
-    compared: Vec<Line>,
+    /// The same of other runs, at the times of the chosen one, with their place among all.
+    compared: Vec<(usize, Line)>,
 }
 
 /// Draws the plot in the space there is. `pointed` becomes the time under the pointer.
@@ -44,7 +46,9 @@ pub fn show(
             signal,
             color: color(ui, signal),
             lines: envelope(session.shown_history(), signal, from, to, columns),
-            compared: compared(session, signal, [from, to], columns),
+            compared: (session.playback.iter())
+                .flat_map(|playback| beside(playback, signal, [from, to], columns))
+                .collect(),
         })
         .collect();
     heading(ui, session, view, (quantity, unit, factor), &traces);
@@ -52,22 +56,6 @@ pub fn show(
         .map(|c| factor * f64::from(c.capabilities.cost_budget))
         .filter(|&budget| budget > 0.0);
     plot(ui, view, quantity, traces, factor, budget, pointed);
-}
-
-/// The lines of a run to compare with, aligned by the first touch.
-fn compared(session: &Session, signal: &Signal, [from, to]: [f64; 2], columns: usize) -> Vec<Line> {
-    let Some(playback) = &session.playback else {
-        return Vec::new();
-    };
-    let Some(other) = &playback.compared else {
-        return Vec::new();
-    };
-    let shift = playback.shift_s();
-    let mut lines = envelope(&other.history, signal, from - shift, to - shift, columns);
-    for [time, _] in lines.iter_mut().flatten() {
-        *time += shift;
-    }
-    lines
 }
 
 /// Draws title, unit, and the name and value of each signal.
@@ -163,9 +151,10 @@ fn plot(
     pointed: &mut Option<f64>,
 ) {
     let ([from, to], zero) = (view.range_s(), view.newest_s());
-    let values = (traces
-        .iter()
-        .flat_map(|trace| trace.lines.iter().chain(&trace.compared).flatten()))
+    let values = (traces.iter().flat_map(|trace| {
+        let compared = trace.compared.iter().map(|(_, line)| line);
+        trace.lines.iter().chain(compared).flatten()
+    }))
     .filter(|[time, _]| (from..=to).contains(time))
     .map(|&[_, value]| factor * value)
     .fold(None, |all: Option<[f64; 2]>, v| {
@@ -224,13 +213,13 @@ fn plot(
                 plot.hline(HLine::new("budget", budget).color(theme::STOP).width(1.0));
             }
             for trace in traces {
-                for points in trace.compared {
+                for (run, points) in trace.compared {
                     let points: PlotPoints<'_> = points
                         .into_iter()
                         .map(|[time, value]| [time - zero, factor * value])
                         .collect();
                     let drawn = egui_plot::Line::new(format!("{}, compared", trace.signal.name), points);
-                    let style = egui_plot::LineStyle::dashed_dense();
+                    let style = line::style(Some(run));
                     plot.line(drawn.color(trace.color).style(style).width(1.2));
                 }
                 for points in trace.lines {
