@@ -12,6 +12,7 @@ use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 
+use super::clutch::ClutchIntent;
 use super::find_connections::ConnectionsIntent;
 use super::finding::NO_FIT;
 use super::flashing::FlashIntent;
@@ -76,6 +77,8 @@ pub enum Intent {
     Grab(usize),
     /// Release the held part.
     Release,
+    /// Let the held part stay while the handle moves, and hold it again.
+    Clutch(ClutchIntent),
     /// Move every part back to its position in the file.
     ResetScene,
     /// Move a part by keys or numbers.
@@ -314,6 +317,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(_) => None,
         },
         Intent::Grab(part) => grab(session, *part),
+        Intent::Clutch(intent) => session.no_clutch(*intent),
         Intent::Release => match session.device() {
             None => no(NO_RIG),
             Some(DeviceState::Active) => None,

@@ -9,6 +9,7 @@ pub mod ask;
 mod barrier;
 pub mod chart;
 pub mod clearances;
+pub mod clutch;
 pub mod connections;
 pub mod document;
 pub mod find_connections;

@@ -72,6 +72,7 @@ impl Session {
             Intent::ShowAll => self.show_all(),
             Intent::Grab(part) => self.grab(part),
             Intent::Release => self.request(ToDevice::Release),
+            Intent::Clutch(intent) => self.clutch(intent),
             Intent::ResetScene => self.put_back(),
             Intent::Move(motion) => self.move_part(&motion),
             Intent::Undo => _ = self.rewind(true),
@@ -337,7 +338,7 @@ impl Session {
         }
     }
 
-    fn request(&self, message: ToDevice) {
+    pub(super) fn request(&self, message: ToDevice) {
         if let Some(connection) = self.connection() {
             connection.request(message);
         }

@@ -171,6 +171,8 @@ pub struct Session {
     pub(super) tour: Option<Tour>,
     /// Held part, and its pose in the handle's frame when it was grabbed.
     pub(super) held: Option<(usize, DAffine3)>,
+    /// The part that is held again when the clutch closes.
+    pub(super) clutched: Option<usize>,
     pub(super) outbox: Outbox,
     pub(super) inbox: Receiver<Update>,
     pub(super) generation: u64,
@@ -229,6 +231,7 @@ impl Session {
             pending_project: None,
             tour: None,
             held: None,
+            clutched: None,
             outbox,
             inbox,
             generation: 0,

@@ -319,6 +319,8 @@ fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
             session.verdict = None;
         }
         watch(session, part, &telemetry, &sample);
+    } else if telemetry.object.is_none() {
+        session.held = None;
     }
     session.telemetry = Some(telemetry);
     session.samples_since_statistics += 1;

@@ -211,10 +211,11 @@ fn state(ui: &mut Ui, session: &Session, width: f32) {
                 DeviceState::Fault(_) => (theme::STOP_HOVER, "Fault"),
                 DeviceState::Testing => (ink.good, "Testing"),
             };
-            let named = session.grabbed().and_then(|part| {
-                let document = session.document.as_ref()?;
-                Some(format!("Holding: {}", document.part_name(part)))
-            });
+            let document = session.document.as_ref();
+            let words = |part, doing: &str| Some(format!("{doing}: {}", document?.part_name(part)));
+            let held = session.grabbed().and_then(|part| words(part, "Holding"));
+            let clutched = session.clutched().and_then(|part| words(part, "Clutch open"));
+            let named = clutched.or(held);
             (color, named.unwrap_or_else(|| text.to_owned()), describe(device))
         }
     };

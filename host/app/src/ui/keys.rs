@@ -45,6 +45,10 @@ pub const KEYS: &[Group] = &[
             ("H", "hide the selected part, and show it again"),
             ("I", "show the selected part alone"),
             ("Shift+H", "show all parts"),
+            (
+                "C, held",
+                "clutch: the held part stays where it is while the handle moves",
+            ),
         ],
     ),
     (

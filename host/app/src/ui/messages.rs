@@ -6,6 +6,9 @@ use super::{control, theme};
 use crate::session::Session;
 use crate::session::notes::{Note, Severity};
 
+/// Name under which the filter is kept.
+const FILTER: &str = "Warnings and errors alone";
+
 /// Colour of a severity.
 pub fn color(palette: &theme::Palette, severity: Severity) -> Color32 {
     match severity {
@@ -22,6 +25,7 @@ pub fn show(ui: &mut Ui, session: &mut Session, beside: impl FnOnce(&mut Ui)) {
         control::section(ui, "Messages");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             beside(ui);
+            filter(ui, session);
             if session.notes.iter().len() > 0 {
                 let button = egui::Button::new(RichText::new("Clear").small().color(theme::of(ui).text_weak))
                     .frame(false);
@@ -36,10 +40,28 @@ pub fn show(ui: &mut Ui, session: &mut Session, beside: impl FnOnce(&mut Ui)) {
         .auto_shrink([false, false])
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 5.0;
-            for note in session.notes.iter() {
+            let least = match only_warnings(session) {
+                true => Severity::Warning,
+                false => Severity::Info,
+            };
+            for note in session.notes.iter().filter(|note| note.severity >= least) {
                 line(ui, note);
             }
         });
+}
+
+fn only_warnings(session: &Session) -> bool {
+    session.preferences.open.get(FILTER).copied().unwrap_or(false)
+}
+
+/// Draws the switch that leaves out messages for the record.
+fn filter(ui: &mut Ui, session: &mut Session) {
+    let on = only_warnings(session);
+    let text = RichText::new("Warnings").small().color(theme::of(ui).text_weak);
+    let button = ui.add(egui::Button::selectable(on, text));
+    if button.on_hover_text("Show warnings and errors alone").clicked() {
+        session.preferences.open.insert(FILTER.to_owned(), !on);
+    }
 }
 
 fn line(ui: &mut Ui, note: &Note) {

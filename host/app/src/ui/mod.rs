@@ -8,6 +8,7 @@ mod below;
 mod bottom;
 mod cards;
 mod clearances;
+mod clutch;
 mod command;
 mod commissioning;
 mod connections;
@@ -138,6 +139,7 @@ impl Window {
         self.command.keys(ui);
         self.help.keys(ui);
         shortcuts(ui, &self.session, &mut wanted);
+        clutch::keys(ui, &self.session, &mut wanted);
         undo::keys(ui, &mut wanted);
         nudge::keys(ui, &self.session, &self.view, &mut wanted);
         let size = ui.max_rect().size();

@@ -4,6 +4,7 @@ use crate::common::{arm, click, connect, harness, open_sample, until};
 use egui::{Rect, Role, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use mortise::session::notes::Severity;
 use mortise::session::purpose::Purpose;
 use mortise::ui::Window;
 
@@ -208,4 +209,22 @@ fn plots_and_messages_fold_to_the_newest_message() {
     assert_eq!(count(&harness, &newest), 1);
     click(&mut harness, "Plots and messages");
     assert_eq!(count(&harness, "Export…"), 1);
+}
+
+#[test]
+fn messages_can_be_filtered_by_severity() {
+    let mut harness = harness();
+    let notes = &mut harness.state_mut().session.notes;
+    notes.add(Severity::Info, "for the record");
+    notes.add(Severity::Warning, "to know about");
+    notes.add(Severity::Error, "it failed");
+    harness.run_steps(2);
+    let seen = |harness: &Harness<'_, Window>| {
+        ["for the record", "to know about", "it failed"].map(|text| harness.query_all_by_label(text).count())
+    };
+    assert_eq!(seen(&harness), [1, 1, 1]);
+    click(&mut harness, "Warnings");
+    assert_eq!(seen(&harness), [0, 1, 1]);
+    click(&mut harness, "Warnings");
+    assert_eq!(seen(&harness), [1, 1, 1]);
 }

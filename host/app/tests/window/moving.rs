@@ -5,7 +5,7 @@ use egui::{Event, Key, Modifiers, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::{DAffine3, DVec3};
-use mortise::session::{Intent, Session, obstacle};
+use mortise::session::{Intent, Session, insertion, obstacle};
 use mortise::ui::{Window, keys};
 use mortise::viewport::camera::View;
 use mortise::viewport::gesture::on_screen;
@@ -494,4 +494,64 @@ fn keys_are_listed_in_the_window_and_on_the_page() {
     }
     press(&mut harness, Modifiers::NONE, Key::F1);
     assert!(harness.query_by_label("undo the last move").is_none());
+}
+
+/// While C is down the hand moves alone; when it comes up, the part is held where it is, and follows the hand from there.
+#[test]
+fn the_clutch_leaves_the_part_and_holds_it_again_without_a_jump() {
+    let mut harness = holding();
+    let shift = |harness: &mut Harness<'_, Window>, by: DVec3| {
+        let handle = harness.state().session.handle().expect("a handle");
+        let to = DAffine3::from_translation(by) * handle;
+        harness.state_mut().session.move_hand(insertion::hold(&to));
+        until(harness, "the hand is there", move |s| {
+            let handle = s.handle().expect("a handle");
+            (handle.translation - to.translation).length() < 0.01
+        });
+    };
+    let free = DVec3::new(0.0, 0.0, 4.0);
+    shift(&mut harness, free);
+    harness.key_down(Key::C);
+    harness.run_steps(2);
+    until(&mut harness, "the part is let go of", |s| {
+        s.device() == Some(DeviceState::Armed) && s.clutched() == Some(1)
+    });
+    let left = poses(&harness)[1];
+    let handle = harness.state().session.handle().expect("a handle");
+    shift(&mut harness, -free);
+    assert_eq!(poses(&harness)[1], left, "the handle moves alone");
+    harness.key_up(Key::C);
+    harness.run_steps(2);
+    until(&mut harness, "the part is held again", |s| s.grabbed() == Some(1));
+    assert_eq!(harness.state().session.clutched(), None);
+    let off = |harness: &Harness<'_, Window>, from: DAffine3| {
+        (poses(harness)[1].translation - from.translation).length()
+    };
+    assert!(
+        off(&harness, left) < 0.1,
+        "it jumps by {} mm",
+        off(&harness, left)
+    );
+    shift(&mut harness, free);
+    let now = harness.state().session.handle().expect("a handle");
+    assert!(
+        (now.translation - handle.translation).length() < 0.5,
+        "the hand is back"
+    );
+    until(&mut harness, "the part follows", move |s| {
+        let at = s.document.as_ref().expect("open").poses[1].translation;
+        (at - left.translation - free).length() < 0.3
+    });
+    // After STOP nothing is held again.
+    harness.key_down(Key::C);
+    harness.run_steps(2);
+    until(&mut harness, "the part is let go of", |s| s.clutched() == Some(1));
+    click(&mut harness, "STOP");
+    until(&mut harness, "stopped", |s| {
+        s.device() == Some(DeviceState::Stopped)
+    });
+    assert_eq!(harness.state().session.clutched(), None);
+    harness.key_up(Key::C);
+    harness.run_steps(5);
+    assert_eq!(harness.state().session.device(), Some(DeviceState::Stopped));
 }
