@@ -63,6 +63,15 @@ pub struct Found {
     pub pairs: Vec<Near>,
 }
 
+impl Found {
+    /// The pairs whose parts can move against one another: not those of one group.
+    pub fn loose<'a>(&'a self, document: &'a Document) -> impl Iterator<Item = &'a Near> {
+        let groups = document.groups();
+        let is_loose = |pair: &&Near| groups.first(pair.parts[0]) != groups.first(pair.parts[1]);
+        self.pairs.iter().filter(is_loose)
+    }
+}
+
 /// Solids with samples, by shape, of one document.
 #[derive(Default)]
 struct Kept {

@@ -213,7 +213,7 @@ fn state(ui: &mut Ui, session: &Session, width: f32) {
             };
             let named = session.grabbed().and_then(|part| {
                 let document = session.document.as_ref()?;
-                Some(format!("Holding: {}", document.part_name(part)))
+                Some(format!("Holding: {}", document.moving_name(part)))
             });
             (color, named.unwrap_or_else(|| text.to_owned()), describe(device))
         }

@@ -1,19 +1,21 @@
-//! The list of parts on the left: the assembly as a tree, and a search in it. A click selects a part, a double click grabs it, the eye hides it.
+//! The list of parts on the left: groups, the assembly as a tree, and a search in both. Under it the selected part, and what groups the selected ones.
 
 use std::cell::Cell;
 
 use egui::collapsing_header::CollapsingState;
-use egui::{
-    Align, Color32, CornerRadius, Id, Layout, RichText, Role, ScrollArea, Sense, TextEdit, Ui, Vec2,
-    WidgetInfo,
-};
+use egui::{Align, Id, Layout, RichText, ScrollArea, TextEdit, Ui, Vec2};
 use mortise_brep::Surface;
 
-use super::{control, eye, motion, theme};
+use super::part_line::{self, Listed};
+use super::{control, motion, theme};
 use crate::session::document::Document;
+use crate::session::grouping::GroupIntent;
 use crate::session::tree::{self, Branch};
-use crate::session::{Intent, Session, obstacle};
+use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
+
+/// Height of the line on groups, points.
+const GROUPING: f32 = 28.0;
 
 /// Draws the list.
 pub fn show(
@@ -33,20 +35,25 @@ pub fn show(
     };
     field(ui, search);
     let under = Cell::new(None);
+    let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
+    let shown = found.as_ref().unwrap_or(&document.tree);
+    let order: Vec<usize> = shown.iter().flat_map(Branch::parts).collect();
     let listed = Listed {
         session,
         document,
+        order: &order,
         marked: &view.marked.parts,
         over: view.over.before,
         pair: view.pair,
         under: &under,
     };
-    let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
     let details = session.selected.filter(|&p| p < document.model.parts.len());
-    let room = if details.is_some() {
-        188.0 + fields.height(ui)
-    } else {
-        0.0
+    let groups = |part: &usize| document.groups().of(*part).is_some() || session.selection().len() > 1;
+    let groups = details.filter(groups);
+    let room = match (details, groups) {
+        (None, _) => 0.0,
+        (Some(_), None) => 188.0 + fields.height(ui),
+        (Some(_), Some(_)) => 188.0 + GROUPING + fields.height(ui),
     };
     ScrollArea::vertical()
         .id_salt("tree")
@@ -72,6 +79,9 @@ pub fn show(
             .auto_shrink([false, true])
             .max_height(ui.available_height())
             .show(ui, |ui| {
+                if groups.is_some() {
+                    grouping(ui, session, document, wanted, part);
+                }
                 self::details(ui, session, document, wanted, part);
                 ui.add_space(2.0);
                 motion::show(ui, session, view, fields, wanted, part);
@@ -119,32 +129,32 @@ fn field(ui: &mut Ui, search: &mut String) {
     ui.add_space(4.0);
 }
 
-/// What lines are drawn of.
-#[derive(Clone, Copy)]
-struct Listed<'a> {
-    session: &'a Session,
-    document: &'a Document,
-    /// Parts that are pointed out.
-    marked: &'a [usize],
-    /// The part under the pointer in the frame before.
-    over: Option<usize>,
-    /// The parts of the connection under the pointer.
-    pair: Option<[usize; 2]>,
-    /// The part whose line is under the pointer.
-    under: &'a Cell<Option<usize>>,
-}
-
 fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches: &[Branch], id: Id) {
     for (index, branch) in branches.iter().enumerate() {
         match branch {
-            Branch::Part(part) => line(ui, listed, wanted, *part),
+            Branch::Part(part) => {
+                let name = listed.document.part_name(*part);
+                part_line::show(ui, listed, wanted, name, &[*part]);
+            }
+            Branch::Group { name, parts } => {
+                let id = id.with(("group", parts));
+                let first = listed.document.groups().first(parts[0]);
+                // A search shows some of the parts; the line is of all.
+                let all = listed.document.groups().together(first);
+                CollapsingState::load_with_default_open(ui.ctx(), id, true)
+                    .show_header(ui, |ui| part_line::show(ui, listed, wanted, name, &all))
+                    .body(|ui| {
+                        for &part in parts {
+                            let name = listed.document.part_name(part);
+                            part_line::show(ui, listed, wanted, name, &[part]);
+                        }
+                    });
+            }
             Branch::Assembly { name, children } => {
                 let id = id.with((index, name));
                 CollapsingState::load_with_default_open(ui.ctx(), id, true)
                     .show_header(ui, |ui| {
-                        ui.add(
-                            egui::Label::new(RichText::new(name).color(theme::of(ui).text_weak)).truncate(),
-                        );
+                        part_line::assembly(ui, listed, wanted, name, &branch.parts());
                     })
                     .body(|ui| self::branches(ui, listed, wanted, children, id));
             }
@@ -152,85 +162,51 @@ fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches:
     }
 }
 
-fn line(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, part: usize) {
-    let Listed {
-        session,
-        document,
-        marked,
-        over,
-        pair,
-        under,
-    } = listed;
-    let pointed = over == Some(part) || pair.is_some_and(|pair| pair.contains(&part));
-    let (name, color) = (document.part_name(part), document.colors[part]);
-    let (selected, held) = (session.selected == Some(part), session.grabbed() == Some(part));
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 28.0), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, selected, name));
-    let painter = ui.painter_at(rect);
-    if response.hovered() {
-        under.set(Some(part));
-    }
-    let fill = match (held, selected, response.hovered() || pointed) {
-        (true, ..) => theme::of(ui).held.gamma_multiply(0.22),
-        (_, true, _) => theme::of(ui).accent_dim.gamma_multiply(0.8),
-        _ if marked.contains(&part) => theme::of(ui).accent_dim.gamma_multiply(0.5),
-        (_, _, true) => theme::of(ui).card,
-        _ => Color32::TRANSPARENT,
+/// What the selection is of a group, or could be: with the button that does it.
+fn grouping(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
+    let selection = session.selection();
+    let together = document.groups().together(part);
+    let is_of_group = selection.iter().all(|part| together.contains(part));
+    let (text, name, intent, hint) = match is_of_group {
+        true => (
+            format!("{} parts as one", together.len()),
+            "Ungroup",
+            GroupIntent::Ungroup(part),
+            "Let every part of the group move by itself (Ctrl+Shift+G)",
+        ),
+        false => (
+            format!("{} parts selected", selection.len()),
+            "Group",
+            GroupIntent::Group(selection),
+            "Grab and move them as one, as they are to one another (Ctrl+G)",
+        ),
     };
-    painter.rect_filled(rect, CornerRadius::same(6), fill);
-    let swatch = egui::Rect::from_center_size(rect.left_center() + Vec2::new(15.0, 0.0), Vec2::splat(12.0));
-    let [r, g, b] = color;
-    painter.rect_filled(swatch, CornerRadius::same(3), Color32::from_rgb(r, g, b));
-    let note = if held {
-        Some(("held", theme::of(ui).held))
-    } else if document.baked.is_some() && !document.is_grabbable(part) {
-        Some(("fixed", theme::of(ui).text_weak))
-    } else {
-        None
-    };
-    let mut right = rect.right() - eye::WIDTH;
-    if let Some((note, color)) = note {
-        let drawn = painter.text(
-            egui::Pos2::new(right, rect.center().y),
-            egui::Align2::RIGHT_CENTER,
-            note,
-            egui::FontId::proportional(11.5),
-            color,
-        );
-        right = drawn.left() - 8.0;
-    }
-    let ink = match document.is_hidden(part) {
-        true => theme::of(ui).text_weak,
-        false => theme::of(ui).text_strong,
-    };
-    let mut job = egui::text::LayoutJob::single_section(
-        name.to_owned(),
-        egui::TextFormat::simple(egui::FontId::proportional(13.5), ink),
-    );
-    job.wrap = egui::text::TextWrapping::truncate_at_width((right - swatch.right() - 8.0).max(10.0));
-    let galley = painter.layout_job(job);
-    let at = egui::Pos2::new(swatch.right() + 8.0, rect.center().y - 0.5 * galley.size().y);
-    painter.galley(at, galley, ink);
-    eye::show(ui, session, rect, response.hovered(), part, wanted);
-    if response.clicked() {
-        wanted.push(Intent::Select(Some(part)));
-    }
-    if response.double_clicked() {
-        wanted.push(Intent::Grab(part));
-    }
-    response.on_hover_ui(|ui| {
-        ui.label(name);
-        let hint = obstacle(session, &Intent::Grab(part)).unwrap_or_else(|| "Double click to grab".into());
-        ui.label(RichText::new(hint).small().color(theme::of(ui).text_weak));
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(text).color(theme::of(ui).text_strong));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let button = egui::Button::new(name);
+            control::intent_button(ui, session, wanted, button, Intent::Group(intent), hint);
+        });
     });
 }
 
 fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
-    let Some(shape) = document.model.shapes.get(document.model.parts[part].shape) else {
+    let is_group =
+        document.groups().of(part).is_some() && session.selection() == document.groups().together(part);
+    let (model, name) = match is_group {
+        true => (&document.grouped.model, document.moving_name(part)),
+        false => (&document.model, document.part_name(part)),
+    };
+    let shown = if is_group {
+        document.groups().first(part)
+    } else {
+        part
+    };
+    let Some(shape) = model.shapes.get(model.parts[shown].shape) else {
         return;
     };
     ui.spacing_mut().item_spacing.y = 3.0;
-    let name = RichText::new(document.part_name(part)).color(theme::of(ui).text_strong);
+    let name = RichText::new(name).color(theme::of(ui).text_strong);
     ui.add(egui::Label::new(name).truncate());
     control::row(ui, "Faces", shape.faces.len().to_string());
     let exact = shape
@@ -252,7 +228,7 @@ fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
 
 fn grab(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, part: usize) {
     let wide = Vec2::new(0.0, 30.0);
-    if session.grabbed() == Some(part) {
+    if session.is_held(part) {
         let button = egui::Button::new("Release").min_size(wide);
         control::intent_button(
             ui,
