@@ -126,25 +126,25 @@ impl Grouped {
 
 #[cfg(test)]
 mod tests {
-    use std::ops::ControlFlow;
-
     use glam::DVec3;
 
     use super::*;
-    use crate::session::document::Document;
     use crate::session::groups::Group;
 
     /// The sample with a second peg, and the two pegs in a group.
     fn grouped() -> Grouped {
-        let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
-        let mut model = CadModel::clone(&document.model);
+        let file = mortise_scenario::sample::File::write().expect("a folder for temporary files");
+        let mut model = mortise_brep::load_step(file.path()).expect("the sample");
         let mut other = model.parts[1].clone();
         other.name = "other peg".into();
         other.placement.translation += 30.0 * DVec3::X;
         model.parts.push(other);
         let poses: Vec<DAffine3> = model.parts.iter().map(|part| part.placement).collect();
         let group = Group::new("pegs".into(), vec![2, 1], &poses, &poses).expect("two parts");
-        let none = Grouped::none(Arc::new(model), document.extents.clone());
+        let shapes = model.shapes.iter();
+        let extents = shapes.map(|shape| Extent::of_points(shape.mesh.vertices.iter().copied()));
+        let extents = extents.collect();
+        let none = Grouped::none(Arc::new(model), extents);
         none.regrouped(Groups::default().with(group))
     }
 

@@ -4,18 +4,21 @@ use std::cell::Cell;
 
 use egui::collapsing_header::CollapsingState;
 use egui::{Align, Id, Layout, RichText, ScrollArea, TextEdit, Ui, Vec2};
-use mortise_brep::Surface;
+use mortise_brep::{Shape, Surface};
 
 use super::part_line::{self, Listed};
 use super::{control, motion, theme};
 use crate::session::document::Document;
 use crate::session::grouping::GroupIntent;
+use crate::session::groups::Group;
 use crate::session::tree::{self, Branch};
 use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 
-/// Height of the line on groups, points.
-const GROUPING: f32 = 28.0;
+/// By how much a name with a button beside it is higher than one without, points.
+const UNGROUP: f32 = 6.0;
+/// Distance of the parts of a group from the left, points.
+const INDENT: f32 = 34.0;
 
 /// Draws the list.
 pub fn show(
@@ -48,12 +51,10 @@ pub fn show(
         under: &under,
     };
     let details = session.selected.filter(|&p| p < document.model.parts.len());
-    let groups = |part: &usize| document.groups().of(*part).is_some() || session.selection().len() > 1;
-    let groups = details.filter(groups);
-    let room = match (details, groups) {
-        (None, _) => 0.0,
-        (Some(_), None) => 188.0 + fields.height(ui),
-        (Some(_), Some(_)) => 188.0 + GROUPING + fields.height(ui),
+    let room = match details {
+        None => 0.0,
+        Some(part) if document.groups().of(part).is_some() => 188.0 + UNGROUP + fields.height(ui),
+        Some(_) => 188.0 + fields.height(ui),
     };
     ScrollArea::vertical()
         .id_salt("tree")
@@ -79,9 +80,6 @@ pub fn show(
             .auto_shrink([false, true])
             .max_height(ui.available_height())
             .show(ui, |ui| {
-                if groups.is_some() {
-                    grouping(ui, session, document, wanted, part);
-                }
                 self::details(ui, session, document, wanted, part);
                 ui.add_space(2.0);
                 motion::show(ui, session, view, fields, wanted, part);
@@ -143,12 +141,7 @@ fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches:
                 let all = listed.document.groups().together(first);
                 CollapsingState::load_with_default_open(ui.ctx(), id, true)
                     .show_header(ui, |ui| part_line::show(ui, listed, wanted, name, &all))
-                    .body(|ui| {
-                        for &part in parts {
-                            let name = listed.document.part_name(part);
-                            part_line::show(ui, listed, wanted, name, &[part]);
-                        }
-                    });
+                    .body_unindented(|ui| members(ui, listed, wanted, parts));
             }
             Branch::Assembly { name, children } => {
                 let id = id.with((index, name));
@@ -162,93 +155,117 @@ fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches:
     }
 }
 
-/// What the selection is of a group, or could be: with the button that does it.
-fn grouping(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
-    let selection = session.selection();
-    let together = document.groups().together(part);
-    let is_of_group = selection.iter().all(|part| together.contains(part));
-    let (text, name, intent, hint) = match is_of_group {
-        true => (
-            format!("{} parts as one", together.len()),
-            "Ungroup",
-            GroupIntent::Ungroup(part),
-            "Let every part of the group move by itself (Ctrl+Shift+G)",
-        ),
-        false => (
-            format!("{} parts selected", selection.len()),
-            "Group",
-            GroupIntent::Group(selection),
-            "Grab and move them as one, as they are to one another (Ctrl+G)",
-        ),
-    };
+/// The lines of the parts of a group.
+fn members(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, parts: &[usize]) {
     ui.horizontal(|ui| {
-        ui.label(RichText::new(text).color(theme::of(ui).text_strong));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let button = egui::Button::new(name);
-            control::intent_button(ui, session, wanted, button, Intent::Group(intent), hint);
+        ui.spacing_mut().item_spacing.x = 0.0;
+        ui.add_space(INDENT);
+        ui.vertical(|ui| {
+            for &part in parts {
+                let name = listed.document.part_name(part);
+                part_line::show(ui, listed, wanted, name, &[part]);
+            }
         });
     });
 }
 
+/// What details are shown of: the selected part, its group where all of that is selected, or several parts.
+enum Subject<'a> {
+    Part,
+    Group(&'a Group),
+    Several(Vec<usize>),
+}
+
+impl<'a> Subject<'a> {
+    fn of(session: &Session, document: &'a Document, part: usize) -> Self {
+        let selection = session.selection();
+        match document.groups().of(part) {
+            Some(group) if selection == group.parts() => Self::Group(group),
+            _ if selection.len() > 1 => Self::Several(selection),
+            _ => Self::Part,
+        }
+    }
+}
+
 fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
-    let is_group =
-        document.groups().of(part).is_some() && session.selection() == document.groups().together(part);
-    let (model, name) = match is_group {
-        true => (&document.grouped.model, document.moving_name(part)),
-        false => (&document.model, document.part_name(part)),
-    };
-    let shown = if is_group {
-        document.groups().first(part)
-    } else {
-        part
-    };
-    let Some(shape) = model.shapes.get(model.parts[shown].shape) else {
-        return;
+    let subject = Subject::of(session, document, part);
+    let (name, parts) = match &subject {
+        Subject::Part => (document.part_name(part).to_owned(), vec![part]),
+        Subject::Group(group) => (group.name.clone(), group.parts().to_vec()),
+        Subject::Several(parts) => (format!("{} parts selected", parts.len()), parts.clone()),
     };
     ui.spacing_mut().item_spacing.y = 3.0;
-    let name = RichText::new(name).color(theme::of(ui).text_strong);
-    ui.add(egui::Label::new(name).truncate());
-    control::row(ui, "Faces", shape.faces.len().to_string());
-    let exact = shape
-        .faces
-        .iter()
-        .filter(|f| !matches!(f.surface, Surface::Spline))
-        .count();
-    control::row(ui, "in closed form", exact.to_string());
-    control::row(ui, "Volume", format!("{} mm³", grouped(shape.volume_mm3)));
-    let closed = if shape.closed {
-        "closed".to_owned()
-    } else {
-        format!("{} open edges", shape.open_edges)
+    heading_of(ui, session, document, wanted, &name, part);
+    let model = &document.model;
+    let shapes: Vec<&Shape> = (parts.iter())
+        .filter_map(|&part| model.shapes.get(model.parts.get(part)?.shape))
+        .collect();
+    let faces = || shapes.iter().flat_map(|shape| &shape.faces);
+    let exact = faces().filter(|face| !matches!(face.surface, Surface::Spline));
+    let volume: f64 = shapes.iter().map(|shape| shape.volume_mm3).sum();
+    control::row(ui, "Faces", faces().count().to_string());
+    control::row(ui, "in closed form", exact.count().to_string());
+    control::row(ui, "Volume", format!("{} mm³", grouped(volume)));
+    let open: usize = shapes.iter().map(|shape| shape.open_edges).sum();
+    let closed = match shapes.iter().all(|shape| shape.closed) {
+        true => "closed".to_owned(),
+        false => format!("{open} open edges"),
     };
     control::row(ui, "Shell", closed);
     ui.add_space(4.0);
-    ui.vertical_centered_justified(|ui| grab(ui, session, wanted, part));
+    ui.vertical_centered_justified(|ui| match subject {
+        Subject::Several(parts) => group(ui, session, wanted, parts),
+        Subject::Part | Subject::Group(_) => grab(ui, session, document, wanted, part),
+    });
 }
 
-fn grab(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, part: usize) {
+/// The name of what is shown, and what takes the group of the part apart.
+fn heading_of(
+    ui: &mut Ui,
+    session: &Session,
+    document: &Document,
+    wanted: &mut Vec<Intent>,
+    name: &str,
+    part: usize,
+) {
+    let label = egui::Label::new(RichText::new(name).color(theme::of(ui).text_strong)).truncate();
+    if document.groups().of(part).is_none() {
+        ui.add(label);
+        return;
+    }
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let button = egui::Button::new(RichText::new("Ungroup").size(12.5));
+            let intent = Intent::Group(GroupIntent::Ungroup(part));
+            let group = document.moving_name(part);
+            let hint = format!("Let every part of {group} move by itself (Ctrl+Shift+G)");
+            control::intent_button(ui, session, wanted, button, intent, &hint);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| ui.add(label));
+        });
+    });
+}
+
+fn group(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, parts: Vec<usize>) {
+    let button = control::primary(ui, "Group").min_size(Vec2::new(0.0, 30.0));
+    let intent = Intent::Group(GroupIntent::Group(parts));
+    let hint = "Grab and move them as one, as they are to one another (Ctrl+G)";
+    control::intent_button(ui, session, wanted, button, intent, hint);
+}
+
+fn grab(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
     let wide = Vec2::new(0.0, 30.0);
     if session.is_held(part) {
         let button = egui::Button::new("Release").min_size(wide);
-        control::intent_button(
-            ui,
-            session,
-            wanted,
-            button,
-            Intent::Release,
-            "The part stays where it is",
-        );
-    } else {
-        let button = control::primary(ui, "Grab").min_size(wide);
-        control::intent_button(
-            ui,
-            session,
-            wanted,
-            button,
-            Intent::Grab(part),
-            "Couple the handle to this part at their present positions",
-        );
+        let hint = "The part stays where it is";
+        control::intent_button(ui, session, wanted, button, Intent::Release, hint);
+        return;
     }
+    let button = control::primary(ui, "Grab").min_size(wide);
+    let hint = match document.groups().of(part) {
+        None => "Couple the handle to this part at their present positions".to_owned(),
+        Some(group) => format!("Couple the handle to {} as one", group.name),
+    };
+    control::intent_button(ui, session, wanted, button, Intent::Grab(part), &hint);
 }
 
 /// A number with its digits in groups of three.
