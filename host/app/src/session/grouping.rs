@@ -24,7 +24,7 @@ impl Session {
         let Some(document) = &self.document else {
             return no("No file is open");
         };
-        if let Some(reason) = self.no_move() {
+        if let Some(reason) = self.no_move().or(self.no_other_bake()) {
             return no(reason);
         }
         let groups = document.groups();
@@ -52,6 +52,13 @@ impl Session {
                 }
             }
         }
+    }
+
+    /// Why the open document cannot be baked otherwise now, as a sentence: that would end the reading of another one.
+    pub(super) fn no_other_bake(&self) -> Option<&'static str> {
+        let open = self.document.as_ref().map(|document| document.generation);
+        let reads = self.job.as_ref().is_some_and(|job| Some(job.generation) != open);
+        reads.then_some("Wait until the other file is read")
     }
 
     pub(super) fn perform_on_groups(&mut self, intent: &GroupIntent) {

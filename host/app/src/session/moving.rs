@@ -38,6 +38,7 @@ impl Session {
         let reason = match (&self.document, step) {
             (None, _) => "No file is open",
             (_, None) => none,
+            _ if self.moves.steps.regroups(back) => self.no_move().or(self.no_other_bake())?,
             _ => self.no_move()?,
         };
         Some(reason.to_owned())

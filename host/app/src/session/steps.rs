@@ -166,6 +166,16 @@ impl Steps {
         self.undone.last().map(|step| step.name.as_str())
     }
 
+    /// Whether the step that is undone next, or redone, groups the parts otherwise.
+    pub fn regroups(&self, back: bool) -> bool {
+        let next = if back {
+            self.done.back()
+        } else {
+            self.undone.last()
+        };
+        next.is_some_and(|step| step.regrouped.is_some())
+    }
+
     /// Goes back by one step; returns its name. The parts are then at [`Self::poses`].
     pub fn undo(&mut self) -> Option<String> {
         let step = self.done.pop_back()?;
@@ -271,7 +281,9 @@ mod tests {
         let moved = [at(5.0), at(6.0), at(2.0)];
         assert!(steps.go_on("move g", &moved));
         assert!(steps.regroup("ungroup g", &moved, Groups::default()));
+        assert!(steps.regroups(true) && !steps.regroups(false));
         assert_eq!(steps.undo().as_deref(), Some("ungroup g"));
+        assert!(!steps.regroups(true) && steps.regroups(false));
         assert_eq!((steps.groups(), steps.poses()), (&groups, &moved[..]));
         assert_eq!(steps.undo().as_deref(), Some("move g"));
         assert_eq!((steps.groups(), steps.poses()), (&groups, &poses[..]));

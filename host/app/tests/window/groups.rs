@@ -16,6 +16,7 @@ use mortise::session::link::Link;
 use mortise::session::run::RunIntent;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
+use mortise::viewport::gesture::on_screen;
 use mortise_brep::CadModel;
 use mortise_protocol::message::DeviceState;
 
@@ -382,6 +383,16 @@ fn what_cannot_be_grouped_is_said() {
     let answer = harness.state().session.instructions.answer.clone().expect("one");
     assert!(answer.words.contains("are a group and move as one"), "{answer:?}");
     assert_eq!(poses(&harness), before);
+    // A bake would end the reading of another file.
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::Open(of_repository(ROW)));
+    assert_eq!(
+        why(session, GroupIntent::Ungroup(1)),
+        "Wait until the other file is read"
+    );
+    let undo = obstacle(session, &Intent::Undo);
+    assert_eq!(undo.as_deref(), Some("Wait until the other file is read"));
+    session.act(Intent::CancelWork);
     connect(&mut harness);
     arm(&mut harness);
     let session = &mut harness.state_mut().session;
@@ -400,6 +411,9 @@ fn what_cannot_be_grouped_is_said() {
 #[test]
 fn the_list_has_the_group_with_its_parts_below_and_acts_on_either() {
     let mut harness = grouped();
+    // All lines are seen.
+    harness.set_size(egui::vec2(1500.0, 1400.0));
+    harness.run_steps(3);
     let hidden = |harness: &Harness<'_, Window>| document(&harness.state().session).hidden.clone();
     let at = |harness: &Harness<'_, Window>, label: &str| line(harness, label).rect();
     let group = at(&harness, NAME);
@@ -439,6 +453,30 @@ fn the_list_has_the_group_with_its_parts_below_and_acts_on_either() {
     harness.run_steps(2);
     let _ = (line(&harness, &all), line(&harness, "pin-free"));
     assert!(harness.query_by_label("pin-in-hole-3").is_none());
+}
+
+#[test]
+fn a_click_with_ctrl_in_the_view_selects_a_part_beside_others() {
+    let mut harness = opened();
+    let view = harness.get_by_label("3D view").rect();
+    let click_at = |harness: &mut Harness<'_, Window>, part: usize| {
+        let window = harness.state();
+        let document = document(&window.session);
+        let middle = document.middle(part).expect("a part");
+        let top = middle + 13.0 * DVec3::Z;
+        let at = on_screen(&window.view.camera, view, top).expect("in front");
+        harness.drag_at(at);
+        harness.step();
+        harness.drop_at(at);
+        harness.run_steps(2);
+    };
+    click_at(&mut harness, 1);
+    assert_eq!(harness.state().session.selection(), [1]);
+    harness.event(egui::Event::ModifiersChanged(Modifiers::CTRL));
+    click_at(&mut harness, 2);
+    assert_eq!(harness.state().session.selection(), [1, 2]);
+    click_at(&mut harness, 1);
+    assert_eq!(harness.state().session.selection(), [2]);
 }
 
 /// The plate with its pins as a subassembly of two.
