@@ -12,6 +12,7 @@ mod fits;
 mod flow;
 mod fonts;
 mod getting_started;
+mod grouping;
 mod groups;
 mod guidance;
 mod joints;
