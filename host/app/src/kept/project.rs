@@ -24,6 +24,9 @@ pub struct Project {
     /// Parts that differ from the model's file.
     #[serde(default)]
     pub parts: Vec<KeptPart>,
+    /// Groups of parts that move as one.
+    #[serde(default)]
+    pub groups: Vec<KeptGroup>,
     /// Choices of fits.
     #[serde(default)]
     pub fits: Vec<KeptFit>,
@@ -74,6 +77,15 @@ pub struct KeptPart {
     /// Whether it is hidden.
     #[serde(default)]
     pub hidden: bool,
+}
+
+/// Parts that move as one, as they are to one another by their placements.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeptGroup {
+    /// Its name.
+    pub name: String,
+    /// Its parts.
+    pub parts: Vec<PartName>,
 }
 
 /// A rigid placement, part to world.
@@ -250,6 +262,10 @@ mod tests {
                     hidden: true,
                 },
             ],
+            groups: vec![KeptGroup {
+                name: "peg, cover".into(),
+                parts: vec![name("peg", 1), name("cover", 0)],
+            }],
             fits: vec![KeptFit {
                 moving: name("peg", 1),
                 moving_surface: 3,
@@ -307,6 +323,20 @@ mod tests {
             let error = Project::from_json(bytes).expect_err("wrong").to_string();
             assert!(error.contains(words) && !error.contains('\n'), "{error}");
         }
+    }
+
+    #[test]
+    fn a_file_from_before_there_were_groups_has_none() {
+        let mut value = serde_json::to_value(some()).expect("JSON");
+        value.as_object_mut().expect("an object").remove("groups");
+        let read = Project::from_json(value.to_string().as_bytes()).expect("readable");
+        assert_eq!(
+            read,
+            Project {
+                groups: Vec::new(),
+                ..some()
+            }
+        );
     }
 
     #[test]
@@ -373,6 +403,11 @@ mod tests {
             placement,
             hidden,
         })
+    }
+
+    fn groups() -> impl Strategy<Value = KeptGroup> {
+        let parts = prop::collection::vec(names(), 0..4);
+        (".{0,12}", parts).prop_map(|(name, parts)| KeptGroup { name, parts })
     }
 
     fn fits() -> impl Strategy<Value = KeptFit> {
@@ -447,14 +482,17 @@ mod tests {
         let model = (path, "[0-9a-f]{64}").prop_map(|(path, sha256)| ModelFile { path, sha256 });
         let parts = prop::collection::vec(parts(), 0..5);
         let fits = prop::collection::vec(fits(), 0..4);
+        let groups = prop::collection::vec(groups(), 0..3);
+        let chosen = (groups, fits);
         let rig = prop::option::of(".{0,12}");
         let signals = prop::option::of(prop::collection::vec(".{0,8}", 0..4));
         let view = prop::option::of(views());
-        (model, parts, fits, settings(), rig, signals, view).prop_map(
-            |(model, parts, fits, settings, rig, signals, view)| Project {
+        (model, parts, chosen, settings(), rig, signals, view).prop_map(
+            |(model, parts, (groups, fits), settings, rig, signals, view)| Project {
                 version: VERSION,
                 model,
                 parts,
+                groups,
                 fits,
                 settings,
                 rig,

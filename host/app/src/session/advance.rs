@@ -101,7 +101,7 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
             let document = session.document.as_ref()?;
             let moving = document.insertion.as_ref()?.moving;
             let part = document.scene_part(moving)?;
-            if session.grabbed() != Some(moving) {
+            if !session.is_held(moving) {
                 ask(session, ToDevice::Grab { part });
                 return None;
             }

@@ -63,6 +63,15 @@ pub struct Found {
     pub pairs: Vec<Near>,
 }
 
+impl Found {
+    /// The pairs whose parts can move against one another: not those of one group.
+    pub fn loose<'a>(&'a self, document: &'a Document) -> impl Iterator<Item = &'a Near> {
+        let groups = document.groups();
+        let is_loose = |pair: &&Near| groups.first(pair.parts[0]) != groups.first(pair.parts[1]);
+        self.pairs.iter().filter(is_loose)
+    }
+}
+
 /// Solids with samples, by shape, of one document.
 #[derive(Default)]
 struct Kept {
@@ -214,6 +223,7 @@ mod tests {
     use std::time::{Duration, Instant};
 
     use super::*;
+    use crate::session::groups::{Group, Groups};
 
     fn wait(search: &mut Search) {
         let begun = Instant::now();
@@ -257,5 +267,30 @@ mod tests {
         assert_eq!(near(0.0123).words(), "gap 12.3 µm");
         assert_eq!(near(-0.25).words(), "overlap 250.0 µm");
         assert_eq!(near(5e-5).words(), "touching");
+    }
+
+    #[test]
+    fn parts_of_one_group_are_no_pair() {
+        let sample = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
+        let mut model = CadModel::clone(&sample.model);
+        model.parts.push(model.parts[1].clone());
+        let mut document = Document::of(model, None, "pegs".into(), 1);
+        let near = |parts| Near {
+            parts,
+            distance_mm: 0.1,
+            place: DVec3::ZERO,
+        };
+        let found = Found {
+            generation: 1,
+            poses: document.poses.clone(),
+            within_mm: 1.0,
+            pairs: [[0, 1], [0, 2], [1, 2]].map(near).to_vec(),
+        };
+        assert_eq!(found.loose(&document).count(), 3);
+        let poses = document.poses.clone();
+        let group = Group::new("pegs".into(), vec![1, 2], &poses, &poses).expect("two parts");
+        document.regroup(Groups::default().with(group));
+        let pairs: Vec<[usize; 2]> = found.loose(&document).map(|pair| pair.parts).collect();
+        assert_eq!(pairs, [[0, 1], [0, 2]]);
     }
 }

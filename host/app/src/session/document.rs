@@ -11,6 +11,8 @@ use mortise_brep::{CadModel, LoadOptions, load_step_while};
 use sha2::{Digest as _, Sha256};
 
 use super::flashed::Flashed;
+use super::grouped::Grouped;
+use super::groups::Groups;
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
 use super::verdict::Watch;
@@ -47,6 +49,8 @@ pub struct Document {
     pub meshes: Arc<Vec<ShapeMesh>>,
     /// A bounding sphere of each shape, in the shape's frame.
     pub extents: Vec<Extent>,
+    /// The parts that move as one, and the model with each group as one part.
+    pub grouped: Arc<Grouped>,
     /// Bounding sphere of all parts as opened, or as the last instruction placed them.
     pub extent: Extent,
     /// sRGB of each part.
@@ -113,11 +117,13 @@ impl Document {
         let poses: Vec<DAffine3> = model.parts.iter().map(|p| p.placement).collect();
         let insertion = insertion::find(&model, &poses);
         let extent = extent_of(&model, &poses);
+        let model = Arc::new(model);
         Self {
             generation,
             path,
             title,
-            tree: tree(&model),
+            grouped: Arc::new(Grouped::none(Arc::clone(&model), extents.clone())),
+            tree: tree(&model, &Groups::default()),
             meshes: Arc::new(model.shapes.iter().map(ShapeMesh::of).collect()),
             extents,
             extent,
@@ -130,7 +136,7 @@ impl Document {
             insertion,
             watch: Watch::of(&model),
             baked: None,
-            model: Arc::new(model),
+            model,
         }
     }
 
@@ -148,32 +154,66 @@ impl Document {
         }
     }
 
-    /// Middle of a part where it is now: the centre of its bounding box, world, mm.
-    pub fn middle(&self, part: usize) -> Option<DVec3> {
-        let shape = self.model.parts.get(part)?.shape;
-        let center = self.extents.get(shape).copied().unwrap_or_default().center;
-        Some(self.poses.get(part)?.transform_point3(center))
+    /// Groups the parts anew, as they are; the scene is to be baked again.
+    pub fn regroup(&mut self, groups: Groups) {
+        self.tree = tree(&self.model, &groups);
+        self.grouped = Arc::new(self.grouped.regrouped(groups));
+        let mut poses = self.poses.clone();
+        self.grouped.groups.gather(&mut poses);
+        self.place(poses);
+        self.insertion = insertion::find(&self.grouped.model, &self.file_poses());
+        self.watch = Watch::of(&self.grouped.model);
+        self.baked = None;
     }
 
-    /// Enlarges the bounding sphere of all parts to one that is being moved, so that it stays in sight.
+    /// The groups of parts that move as one.
+    pub fn groups(&self) -> &Groups {
+        &self.grouped.groups
+    }
+
+    /// Puts a part at a pose, mm, and with it those of its group.
+    pub fn put(&mut self, part: usize, pose: DAffine3) {
+        self.grouped.groups.put(&mut self.poses, part, pose);
+    }
+
+    /// Where all parts are, mm, with this one, and those of its group with it, at a pose.
+    pub fn poses_with(&self, part: usize, pose: DAffine3) -> Vec<DAffine3> {
+        let mut poses = self.poses.clone();
+        self.groups().put(&mut poses, part, pose);
+        poses
+    }
+
+    /// Bounding sphere of a part, or of the group that it stands for, in its frame, mm.
+    pub fn own_extent(&self, part: usize) -> Extent {
+        let shape = self.grouped.model.parts.get(part).map(|part| part.shape);
+        let extent = shape.and_then(|shape| self.grouped.extents.get(shape));
+        extent.copied().unwrap_or_default()
+    }
+
+    /// Middle of a part, or of its group, where it is now: the centre of its bounding box, world, mm.
+    pub fn middle(&self, part: usize) -> Option<DVec3> {
+        let first = self.groups().first(part);
+        let center = self.own_extent(first).center;
+        Some(self.poses.get(first)?.transform_point3(center))
+    }
+
+    /// Enlarges the bounding sphere of all parts to one that is being moved, or its group, so that it stays in sight.
     pub fn extend_to(&mut self, part: usize) {
-        let shape = self.model.parts.get(part).map(|part| part.shape);
-        let own = shape.and_then(|shape| self.extents.get(shape)).copied();
-        if let (Some(own), Some(center)) = (own, self.middle(part)) {
+        let own = self.own_extent(self.groups().first(part));
+        if let Some(center) = self.middle(part) {
             let reach = center.distance(self.extent.center) + own.radius;
             self.extent.radius = self.extent.radius.max(reach);
         }
     }
 
-    /// Poses of the parts in the file, mm.
+    /// Poses of the parts in the file, those of a group with its first part, mm.
     pub fn file_poses(&self) -> Vec<DAffine3> {
-        self.model.parts.iter().map(|part| part.placement).collect()
+        self.grouped.file_poses()
     }
 
     /// Whether the scene that is sent to a board has a part elsewhere than the file.
     pub fn is_placed(&self) -> bool {
-        let placements = self.model.parts.iter().map(|part| &part.placement);
-        !placements.eq(&self.placed)
+        self.file_poses() != self.placed
     }
 
     /// Where the parts of the baked scene are placed, in its order, mm; `None` until it is baked.
@@ -194,25 +234,53 @@ impl Document {
         self.model.parts.get(part).map_or("?", |p| p.name.as_str())
     }
 
+    /// Name of what moves with a part: of its group, or its own.
+    pub fn moving_name(&self, part: usize) -> &str {
+        let group = self.groups().of(part);
+        group.map_or_else(|| self.part_name(part), |group| &group.name)
+    }
+
+    /// The part of the file to which faces of a part of the scene belong, with their numbers there. Faces of several parts of a group, or unknown ones, keep the
+    /// group's numbers, and `None` stands for it.
+    pub fn owner(&self, part: usize, faces: &[u32]) -> (Option<usize>, Vec<u32>) {
+        let owners: Option<Vec<(usize, u32)>> =
+            (faces.iter().map(|&face| self.grouped.owner(part, face))).collect();
+        match owners.as_deref() {
+            Some([(first, _), others @ ..]) if others.iter().all(|(other, _)| other == first) => {
+                let own = owners.iter().flatten().map(|(_, face)| *face);
+                (Some(*first), own.collect())
+            }
+            _ => (None, faces.to_vec()),
+        }
+    }
+
+    /// Name of what faces of a part of the scene belong to: of a part of the file, or of a group where they belong to several of its parts.
+    pub fn owner_name(&self, part: usize, faces: &[u32]) -> &str {
+        let (owner, _) = self.owner(part, faces);
+        owner.map_or_else(|| self.moving_name(part), |owner| self.part_name(owner))
+    }
+
     /// Whether a part is hidden: neither drawn nor picked.
     pub fn is_hidden(&self, part: usize) -> bool {
         self.hidden.get(part).is_some_and(|hidden| *hidden)
     }
 
-    /// Whether a part may be grabbed; `false` until the scene is baked.
+    /// Whether a part, or its group, may be grabbed; `false` until the scene is baked.
     pub fn is_grabbable(&self, part: usize) -> bool {
+        let first = self.groups().first(part);
         let reports = self.baked.as_ref().map(|b| b.report.parts.as_slice());
-        (reports.unwrap_or_default().iter()).any(|r| r.model_part == part && r.grabbable)
+        (reports.unwrap_or_default().iter()).any(|r| r.model_part == first && r.grabbable)
     }
 
-    /// Index in the scene of a part of the model; `None` for parts without a surface.
+    /// Index in the scene of a part of the model, or of its group; `None` for parts without a surface.
     pub fn scene_part(&self, part: usize) -> Option<u16> {
+        let first = self.groups().first(part);
         let reports = &self.baked.as_ref()?.report.parts;
-        let index = reports.iter().position(|r| r.model_part == part)?;
+        let index = reports.iter().position(|r| r.model_part == first)?;
         u16::try_from(index).ok()
     }
 
-    /// Index in the model of a part of the scene.
+    /// Index in the model of a part of the scene; of a group, its first part.
     pub fn model_part(&self, scene_part: u16) -> Option<usize> {
         let reports = &self.baked.as_ref()?.report.parts;
         reports.get(usize::from(scene_part)).map(|r| r.model_part)

@@ -39,26 +39,29 @@ impl Session {
     fn find_joints(&mut self, part: usize) {
         let Some(document) = &self.document else { return };
         let id = self.joints.begin(document.generation, part);
+        let parts = document.groups().together(part);
         let mut model = CadModel::clone(&document.model);
         for (part, pose) in model.parts.iter_mut().zip(&document.poses) {
             part.placement = *pose;
         }
         let outbox = self.outbox.clone();
         spawn("mortise-joints", move || {
-            let result = search(model, part);
+            let result = search(model, parts);
             outbox.send(Update::Joints(JointsFound { id, result }));
         });
     }
 }
 
-/// The joints of a part. Cost: a sweep against every other part for each direction in which it could move; a second in an assembly of 20 parts.
-fn search(model: CadModel, part: usize) -> Result<PartJoints, String> {
+/// The joints of parts that move as one. Cost: a sweep against every other part for each direction in which it could move; a second in an assembly of 20 parts.
+fn search(model: CadModel, parts: Vec<usize>) -> Result<PartJoints, String> {
     let assembly = Assembly::new(model).map_err(|error| error.to_string())?;
-    let others: Vec<usize> = (0..assembly.count()).filter(|&other| other != part).collect();
+    let others: Vec<usize> = (0..assembly.count())
+        .filter(|other| !parts.contains(other))
+        .collect();
     let group = Moved {
-        parts: &[part],
+        parts: &parts,
         by: DAffine3::IDENTITY,
     };
     let found = freedoms(&assembly, &group, &others, &[]);
-    Ok(PartJoints::new(&assembly, part, &found))
+    Ok(PartJoints::new(&assembly, parts, &found))
 }

@@ -13,11 +13,11 @@ use super::threads::{Cancel, spawn};
 pub(super) const NO_FIT: &str = "No fit is shown: find fits first";
 
 impl Session {
-    /// The part whose fits are found: the held one, or the selected one.
+    /// The part whose fits are found: the held one, or the selected one; of a group its first part.
     pub fn fit_subject(&self) -> Option<usize> {
         let part = self.grabbed().or(self.selected)?;
-        let parts = &self.document.as_ref()?.model.parts;
-        (part < parts.len()).then_some(part)
+        let document = self.document.as_ref()?;
+        (part < document.poses.len()).then(|| document.groups().first(part))
     }
 
     /// Searches the fits with the chosen part, or with the nearest ones.
@@ -30,7 +30,7 @@ impl Session {
             .partner
             .map_or_else(|| nearest(document, moving), |part| vec![part]);
         self.fit_searches += 1;
-        let (id, model) = (self.fit_searches, Arc::clone(&document.model));
+        let (id, model) = (self.fit_searches, Arc::clone(&document.grouped.model));
         let (outbox, cancel) = (self.outbox.clone(), Cancel::default());
         self.fitting = Some(Fitting::new(id, moving, partners.len(), cancel.clone()));
         spawn("mortise-fits", move || {
@@ -103,8 +103,8 @@ impl Session {
         let Some(part) = self.fit_subject() else {
             return no("Select a part first");
         };
-        if !is_closed(&document.model, part) {
-            let name = document.part_name(part);
+        if !is_closed(&document.grouped.model, part) {
+            let name = document.moving_name(part);
             return Some(format!("{name} has no closed surface: choose another part"));
         }
         match self.partner {
@@ -129,12 +129,10 @@ impl Session {
             return;
         };
         let Some(offer) = fitting.offer() else { return };
-        let (moving, mut poses) = (fitting.moving, document.poses.clone());
-        let (Some(pose), Some(place)) = (offer.pose(document), poses.get_mut(moving)) else {
-            return;
-        };
-        *place = pose;
-        let (part, other) = (document.part_name(moving), document.part_name(offer.against));
+        let moving = fitting.moving;
+        let Some(pose) = offer.pose(document) else { return };
+        let poses = document.poses_with(moving, pose);
+        let (part, other) = (document.moving_name(moving), document.moving_name(offer.against));
         let text = format!("Placed {part} in its fit with {other}; Ctrl+Z undoes it");
         let name = format!("place {part} in its fit with {other}");
         self.place(poses);

@@ -100,12 +100,12 @@ impl Fitting {
     /// The middle of the part where it is now, mm.
     pub fn middle(&self, document: &Document) -> Option<DVec3> {
         let pose = document.poses.get(self.moving)?;
-        Some(pose.transform_point3(extent(document, self.moving).center))
+        Some(pose.transform_point3(document.own_extent(self.moving).center))
     }
 
     /// A sphere around the part and its place in the fit that is shown, mm.
     pub fn extent(&self, document: &Document) -> Option<Extent> {
-        let Extent { center, radius } = extent(document, self.moving);
+        let Extent { center, radius } = document.own_extent(self.moving);
         let ends = [*document.poses.get(self.moving)?, self.offer()?.pose(document)?];
         let [here, there] = ends.map(|pose| pose.transform_point3(center));
         Some(Extent {
@@ -147,7 +147,7 @@ impl Fitting {
     /// The fit in which the part goes in the other way round, nearest to the one shown; turned over again, the one shown before.
     pub fn turned_over(&self, document: &Document) -> Option<usize> {
         let shown = self.offer()?;
-        let middle = extent(document, self.moving).center;
+        let middle = document.own_extent(self.moving).center;
         let seat = |offer: &Offer| offer.fit.placement.transform_point3(middle);
         let is_over = |offer: &Offer| {
             let turn = offer.fit.placement.matrix3 * shown.fit.placement.matrix3.transpose();
@@ -179,7 +179,7 @@ impl Fitting {
 impl Offer {
     /// From the assembly as in its file to the assembly as it is: where the other part is now.
     fn moved(&self, document: &Document) -> Option<DAffine3> {
-        let file = document.model.parts.get(self.against)?.placement;
+        let file = document.grouped.model.parts.get(self.against)?.placement;
         Some(*document.poses.get(self.against)? * file.inverse())
     }
 
@@ -200,7 +200,7 @@ impl Offer {
         let seat = self
             .fit
             .placement
-            .transform_point3(extent(document, moving).center);
+            .transform_point3(document.own_extent(moving).center);
         let way = points(path, seat).into_iter();
         way.map(|point| moved.transform_point3(point)).collect()
     }
@@ -221,24 +221,17 @@ fn points(path: &Path, seat: DVec3) -> Vec<DVec3> {
     (0..=count).map(at).collect()
 }
 
-/// Bounding sphere of a part in its own frame, mm.
-pub(super) fn extent(document: &Document, part: usize) -> Extent {
-    let shape = document.model.parts.get(part).map(|part| part.shape);
-    let extent = shape.and_then(|shape| document.extents.get(shape));
-    extent.copied().unwrap_or_default()
-}
-
 /// The parts with a closed surface that are nearest to a part, the nearest first; of equal parts only the nearest.
 pub fn nearest(document: &Document, moving: usize) -> Vec<usize> {
-    let own = extent(document, moving);
+    let own = document.own_extent(moving);
     let Some(pose) = document.poses.get(moving) else {
         return Vec::new();
     };
     let middle = pose.transform_point3(own.center);
     let mut others: Vec<(f64, usize)> = (document.poses.iter().enumerate())
-        .filter(|&(part, _)| part != moving && is_closed(&document.model, part))
+        .filter(|&(part, _)| part != moving && is_closed(&document.grouped.model, part))
         .map(|(part, pose)| {
-            let other = extent(document, part);
+            let other = document.own_extent(part);
             let apart = pose.transform_point3(other.center).distance(middle);
             (apart - other.radius - own.radius, part)
         })
@@ -247,7 +240,7 @@ pub fn nearest(document: &Document, moving: usize) -> Vec<usize> {
     let mut shapes: Vec<usize> = Vec::new();
     let mut nearest = Vec::new();
     for (_, part) in others {
-        let shape = document.model.parts[part].shape;
+        let shape = document.grouped.model.parts[part].shape;
         if nearest.len() < MOST_PARTNERS && !shapes.contains(&shape) {
             shapes.push(shape);
             nearest.push(part);
@@ -341,7 +334,7 @@ mod tests {
     #[test]
     fn turning_over_takes_the_nearest_reversed_fit_and_comes_back() {
         let document = sample();
-        let middle = extent(&document, 1).center;
+        let middle = document.own_extent(1).center;
         // The middle of the part is at this height, whichever way round it is.
         let at = |axis: DVec3, angle: f64, z: f64| {
             let turn = DQuat::from_axis_angle(axis, angle);
@@ -385,12 +378,12 @@ mod tests {
         assert!(pose.abs_diff_eq(by * offer.fit.placement, 1e-12));
         let around = fitting.extent(&document).expect("one");
         for pose in [pose, document.poses[1]] {
-            let Extent { center, radius } = extent(&document, 1);
+            let Extent { center, radius } = document.own_extent(1);
             let reach = pose.transform_point3(center).distance(around.center) + radius;
             assert!(reach < around.radius + 1e-9);
         }
         let way = offer.way(&document, 1);
-        let middle = extent(&document, 1).center;
+        let middle = document.own_extent(1).center;
         assert!(way[1].abs_diff_eq(pose.transform_point3(middle), 1e-9));
         assert!((way[1] - way[0]).abs_diff_eq(by.transform_vector3(30.0 * DVec3::Z), 1e-9));
     }
@@ -420,9 +413,11 @@ mod tests {
 
     #[test]
     fn the_nearest_parts_are_those_with_a_closed_surface() {
-        let mut document = sample();
+        let document = sample();
         assert_eq!(nearest(&document, 1), [0]);
-        std::sync::Arc::make_mut(&mut document.model).shapes[0].closed = false;
+        let mut model = (*document.model).clone();
+        model.shapes[0].closed = false;
+        let document = Document::of(model, None, document.title, 0);
         assert_eq!(nearest(&document, 1), Vec::<usize>::new());
     }
 }

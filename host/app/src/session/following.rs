@@ -8,7 +8,7 @@ use mortise_mating::recognise::Target;
 
 use super::document::Document;
 use super::finding::NO_FIT;
-use super::fitting::{extent, is_closed};
+use super::fitting::is_closed;
 use super::outbox::Update;
 use super::state::Session;
 use super::tap::GuidanceCommand;
@@ -29,7 +29,7 @@ impl Session {
         }
         self.ways.of_assembly.insert(moving, Vec::new());
         let partners = partners(document, moving);
-        let (generation, model) = (document.generation, Arc::clone(&document.model));
+        let model = Arc::clone(&document.grouped.model);
         let (outbox, cancel) = (self.outbox.clone(), self.ways.cancel.clone());
         let options = FitOptions {
             only_placed: true,
@@ -48,7 +48,7 @@ impl Session {
                 targets.extend((found.fits.iter()).filter_map(|fit| along(&model, moving, against, fit)));
             }
             outbox.send(Update::Ways(WaysFound {
-                generation,
+                model,
                 moving,
                 targets,
             }));
@@ -57,8 +57,8 @@ impl Session {
 
     /// Takes in what a search found.
     pub(super) fn ways_found(&mut self, found: WaysFound) {
-        let is_current =
-            (self.document.as_ref()).is_some_and(|document| document.generation == found.generation);
+        let is_current = (self.document.as_ref())
+            .is_some_and(|document| Arc::ptr_eq(&document.grouped.model, &found.model));
         if is_current && !found.targets.is_empty() {
             self.ways.of_assembly.insert(found.moving, found.targets);
             self.command_guidance(GuidanceCommand::Follow(self.ways.followed()));
@@ -69,7 +69,7 @@ impl Session {
     fn shown_way(&self) -> Option<Target> {
         let (fitting, document) = (self.fitting.as_ref()?, self.document.as_ref()?);
         let offer = fitting.offer()?;
-        along(&document.model, fitting.moving, offer.against, &offer.fit)
+        along(&document.grouped.model, fitting.moving, offer.against, &offer.fit)
     }
 
     /// Whether guidance follows the fit that is shown by the operator's choice.
@@ -100,17 +100,18 @@ impl Session {
 
 /// Parts with a closed surface in whose bounding spheres a part reaches where the file has both, the deepest first.
 fn partners(document: &Document, moving: usize) -> Vec<usize> {
-    let parts = &document.model.parts;
+    let model = &document.grouped.model;
+    let parts = &model.parts;
     let sphere = |part: usize| {
-        let own = extent(document, part);
+        let own = document.own_extent(part);
         (parts[part].placement.transform_point3(own.center), own.radius)
     };
-    if !is_closed(&document.model, moving) {
+    if !is_closed(model, moving) {
         return Vec::new();
     }
     let (middle, radius) = sphere(moving);
     let mut others: Vec<(f64, usize)> = (0..parts.len())
-        .filter(|&part| part != moving && is_closed(&document.model, part))
+        .filter(|&part| part != moving && is_closed(model, part))
         .map(|part| {
             let (center, other) = sphere(part);
             (center.distance(middle) - radius - other, part)

@@ -21,7 +21,7 @@ use super::threads::spawn;
 
 /// What guidance starts with.
 pub struct Start {
-    /// The model.
+    /// The model, each group as one part.
     pub model: Arc<CadModel>,
     /// Pose of each part of the model in the scene, mm, if one is not the file's.
     pub placed: Option<Vec<DAffine3>>,

@@ -124,6 +124,12 @@ impl Session {
                     "nothing was done. {why}, and give the instruction again"
                 ));
             }
+            if let Some(group) = document.groups().broken(&poses) {
+                return refused(&format!(
+                    "nothing was done: the parts of {} are a group and move as one; ungroup them, and give the instruction again",
+                    group.name
+                ));
+            }
             // A board gets the scene with the parts here.
             self.place(poses);
             self.note_step(&format!("\"{}\"", running.text));

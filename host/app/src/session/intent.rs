@@ -16,6 +16,7 @@ use super::clutch::ClutchIntent;
 use super::find_connections::ConnectionsIntent;
 use super::finding::NO_FIT;
 use super::flashing::FlashIntent;
+use super::grouping::GroupIntent;
 use super::joints::JointIntent;
 use super::link::Link;
 use super::moves::Motion;
@@ -67,9 +68,15 @@ pub enum Intent {
     Home,
     /// Select a part in the list and the view.
     Select(Option<usize>),
+    /// Select these parts, the first one to act on.
+    SelectThese(Vec<usize>),
+    /// Add parts to the selection, or take them out where all of them are in it.
+    SelectAlso(Vec<usize>),
+    /// An action on groups of parts.
+    Group(GroupIntent),
     /// Hide a part in the view, or show it again.
     Hide(usize, bool),
-    /// Hide all parts but this one and the held one.
+    /// Hide all parts but this one, those selected with it, and the held ones.
     Isolate(usize),
     /// Show every part.
     ShowAll,
@@ -194,6 +201,8 @@ impl Intent {
         matches!(
             self,
             Self::Select(_)
+                | Self::SelectThese(_)
+                | Self::SelectAlso(_)
                 | Self::Hide(..)
                 | Self::Isolate(_)
                 | Self::ShowAll
@@ -252,6 +261,8 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Stop
         | Intent::RefreshRigs
         | Intent::Select(_)
+        | Intent::SelectThese(_)
+        | Intent::SelectAlso(_)
         | Intent::GuideWhen(_)
         | Intent::GuideCap(_)
         | Intent::FitWith(_)
@@ -309,7 +320,8 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(_) if armed => no("Only while the motors are off: disarm first"),
             Some(_) => None,
         },
-        Intent::Hide(part, true) if session.grabbed() == Some(*part) => no("It is held: release it first"),
+        Intent::Group(intent) => session.no_grouping(intent),
+        Intent::Hide(part, true) if session.is_held(*part) => no("It is held: release it first"),
         Intent::Hide(..) | Intent::Isolate(_) => session.document.is_none().then(|| NO_FILE.to_owned()),
         Intent::ShowAll => match &session.document {
             None => no(NO_FILE),
@@ -495,7 +507,7 @@ fn grab(session: &Session, part: usize) -> Option<String> {
     if !document.is_grabbable(part) {
         return no("This part is fixed: the largest part of the assembly stays where it is");
     }
-    (session.grabbed() == Some(part)).then(|| "It is held".to_owned())
+    session.is_held(part).then(|| "It is held".to_owned())
 }
 
 fn play(session: &Session) -> Option<String> {

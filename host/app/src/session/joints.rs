@@ -32,6 +32,8 @@ pub enum JointIntent {
 pub struct Joint {
     /// The joint in words.
     pub words: String,
+    /// The part that touches: the one that was asked about, or another of its group.
+    part: usize,
     /// The other part.
     pub other: usize,
     /// Faces of the part, and of the other.
@@ -80,11 +82,11 @@ impl Motion {
     }
 }
 
-/// What was found of a part.
+/// What was found of a part, or of a group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartJoints {
-    /// The part.
-    pub part: usize,
+    /// The parts that move as one, ascending.
+    pub parts: Vec<usize>,
     /// Its joints, those of the largest area first.
     pub joints: Vec<Joint>,
     /// Its freedoms, those by which it leaves first.
@@ -94,27 +96,32 @@ pub struct PartJoints {
 }
 
 impl PartJoints {
-    /// The joints and freedoms of a part of `assembly`, whose parts are placed where they are.
-    pub fn new(assembly: &Assembly, part: usize, found: &Freedoms) -> Self {
+    /// The joints and freedoms of parts of `assembly` that move as one; all parts are placed where they are.
+    pub fn new(assembly: &Assembly, parts: Vec<usize>, found: &Freedoms) -> Self {
+        // Those of the parts with one another cannot move.
         let mut contacts: Vec<&Contact> = (assembly.contacts.iter())
-            .filter(|contact| contact.parts.contains(&part))
+            .filter(|contact| {
+                let [a, b] = contact.parts.map(|part| parts.contains(&part));
+                a != b
+            })
             .collect();
         contacts.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
         let all: Vec<usize> = (0..assembly.count()).collect();
         let (low, high) = assembly.bounds_of(&all, DAffine3::IDENTITY);
         Self {
-            part,
             joints: (contacts.into_iter())
-                .map(|contact| joint(assembly, part, contact))
+                .map(|contact| joint(assembly, &parts, contact))
                 .collect(),
+            parts,
             freedoms: freedoms(assembly, found, 0.5 * low.distance(high)),
             poses: (assembly.model.parts.iter()).map(|part| part.placement).collect(),
         }
     }
 }
 
-fn joint(assembly: &Assembly, part: usize, contact: &Contact) -> Joint {
-    let own = usize::from(contact.parts[1] == part);
+fn joint(assembly: &Assembly, parts: &[usize], contact: &Contact) -> Joint {
+    let own = usize::from(parts.contains(&contact.parts[1]));
+    let part = contact.parts[own];
     let other = contact.parts[1 - own];
     let (name, round) = (assembly.name(other), contact.radius_mm);
     let round = round.map_or_else(String::new, |radius| format!(", Ø {:.3} mm", 2.0 * radius));
@@ -131,7 +138,12 @@ fn joint(assembly: &Assembly, part: usize, contact: &Contact) -> Joint {
         faces.dedup();
         faces
     });
-    Joint { words, other, faces }
+    Joint {
+        words,
+        part,
+        other,
+        faces,
+    }
 }
 
 fn freedoms(assembly: &Assembly, found: &Freedoms, radius: f64) -> Vec<Freedom> {
@@ -192,10 +204,11 @@ impl Joints {
         self.search
     }
 
-    /// What was found of a part of the open document, unless parts have moved since.
+    /// What was found of a part of the open document, or of its group, unless parts have moved or were grouped since.
     pub fn of(&self, document: &Document, part: usize) -> Option<&PartJoints> {
         let found = self.found.as_ref()?.as_ref().ok()?;
-        let is_its = self.generation == Some(document.generation) && found.part == part;
+        let is_its =
+            self.generation == Some(document.generation) && found.parts == document.groups().together(part);
         (is_its && are_same(&found.poses, &document.poses)).then_some(found)
     }
 
@@ -221,9 +234,10 @@ impl Joints {
         let faces = || {
             let marked = self.marked?;
             let found = self.found.as_ref()?.as_ref().ok()?;
-            let joint = self.of(document, found.part)?.joints.get(marked)?;
+            let first = *found.parts.first()?;
+            let joint = self.of(document, first)?.joints.get(marked)?;
             match part {
-                _ if part == found.part => Some(&joint.faces[0]),
+                _ if part == joint.part => Some(&joint.faces[0]),
                 _ if part == joint.other => Some(&joint.faces[1]),
                 _ => None,
             }
@@ -231,16 +245,17 @@ impl Joints {
         faces().map_or(&[], Vec::as_slice)
     }
 
-    /// Parts that are looked at: those of the joint that is marked, or the one whose freedom is shown; `None`: all.
+    /// Parts that are looked at: what moves, with the other one of the joint that is marked; `None`: all.
     pub fn in_focus(&self, document: &Document) -> Option<Vec<usize>> {
         if self.marked.is_none() && self.shown.is_none() {
             return None;
         }
         let found = self.found.as_ref()?.as_ref().ok()?;
-        let found = self.of(document, found.part)?;
+        let found = self.of(document, *found.parts.first()?)?;
+        let with = |other: usize| [found.parts.as_slice(), &[other]].concat();
         match (self.marked.and_then(|joint| found.joints.get(joint)), self.shown) {
-            (Some(joint), _) => Some(vec![found.part, joint.other]),
-            (None, Some(_)) => Some(vec![found.part]),
+            (Some(joint), _) => Some(with(joint.other)),
+            (None, Some(_)) => Some(found.parts.clone()),
             (None, None) => None,
         }
     }

@@ -430,7 +430,7 @@ impl Connection {
         guidance::start(
             &self.tap,
             guidance::Start {
-                model: Arc::clone(&document.model),
+                model: Arc::clone(&document.grouped.model),
                 placed: document.is_placed().then(|| document.placed.clone()),
                 parts,
                 fits: fits.clone(),

@@ -11,7 +11,7 @@ use crate::display::extent::Extent;
 /// Name of the step that puts every part back.
 pub(super) const PUT_BACK: &str = "put parts back";
 
-/// A motion of a part by keys or numbers: a turn about its middle, then a shift, both in the world.
+/// A motion of a part, and of its group with it, by keys or numbers: a turn about the middle of what moves, then a shift, both in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// The part.
@@ -46,8 +46,10 @@ impl Motion {
 #[derive(Clone, Debug)]
 pub(super) struct Dragged {
     pub part: usize,
-    /// Where it was.
-    pub from: DAffine3,
+    /// The part that stands for it and those of its group: what follows is that one's.
+    pub first: usize,
+    /// Where all parts were.
+    pub from: Vec<DAffine3>,
     /// Bounding sphere of all parts then.
     pub extent: Extent,
     /// Whether it stops where it meets another part.

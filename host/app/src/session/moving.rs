@@ -38,6 +38,7 @@ impl Session {
         let reason = match (&self.document, step) {
             (None, _) => "No file is open",
             (_, None) => none,
+            _ if self.moves.steps.regroups(back) => self.no_move().or(self.no_other_bake())?,
             _ => self.no_move()?,
         };
         Some(reason.to_owned())
@@ -52,9 +53,10 @@ impl Session {
             return false;
         };
         self.moves.drags += 1;
-        self.moves.dragged = document.poses.get(part).map(|from| Dragged {
+        self.moves.dragged = Some(Dragged {
             part,
-            from: *from,
+            first: document.groups().first(part),
+            from: document.poses.clone(),
             extent: document.extent,
             stops_at_contact,
             goal: None,
@@ -67,29 +69,32 @@ impl Session {
 
     /// Where the part that is being dragged was, mm.
     pub fn dragged_from(&self) -> Option<DAffine3> {
-        self.moves.dragged.as_ref().map(|dragged| dragged.from)
+        let dragged = self.moves.dragged.as_ref()?;
+        dragged.from.get(dragged.part).copied()
     }
 
     /// Drags the part to a pose, mm, or where it is to stop at contact towards it; a board gets it there once it is let go of.
     pub fn drag_to(&mut self, pose: DAffine3) {
-        if let Some(dragged) = &mut self.moves.dragged
+        if let (Some(dragged), Some(document)) = (&mut self.moves.dragged, &mut self.document)
             && pose.is_finite()
         {
             if dragged.stops_at_contact {
-                dragged.goal = Some(pose);
+                let group = document.groups().of(dragged.part);
+                let first = group.and_then(|group| group.first_with(dragged.part, pose));
+                dragged.goal = Some(first.unwrap_or(pose));
                 self.go_towards();
             } else {
-                self.show_dragged(pose);
+                document.put(dragged.part, pose);
+                document.extend_to(dragged.part);
             }
         }
     }
 
+    /// Shows what is dragged where its first part is at a pose, mm.
     fn show_dragged(&mut self, pose: DAffine3) {
-        if let (Some(dragged), Some(document)) = (&self.moves.dragged, &mut self.document)
-            && let Some(shown) = document.poses.get_mut(dragged.part)
-        {
-            *shown = pose;
-            document.extend_to(dragged.part);
+        if let (Some(dragged), Some(document)) = (&self.moves.dragged, &mut self.document) {
+            document.put(dragged.first, pose);
+            document.extend_to(dragged.first);
         }
     }
 
@@ -107,10 +112,10 @@ impl Session {
         dragged.asked = Some(goal);
         let stretch = Stretch {
             drag: self.moves.drags,
-            model: Arc::clone(&document.model),
-            extents: document.extents.clone(),
+            model: Arc::clone(&document.grouped.model),
+            extents: document.grouped.extents.clone(),
             poses: document.poses.clone(),
-            part: dragged.part,
+            part: dragged.first,
             to: goal,
         };
         self.moves.barrier.ask(stretch, || self.outbox.waker());
@@ -134,7 +139,7 @@ impl Session {
     /// was, as far as it can.
     pub fn let_go_of_dragged(&mut self, verb: &str) {
         if let (Some(dragged), Some(document)) = (&mut self.moves.dragged, &self.document) {
-            dragged.ends = Some(format!("{verb} {}", document.part_name(dragged.part)));
+            dragged.ends = Some(format!("{verb} {}", document.moving_name(dragged.part)));
         }
         self.end_drag();
     }
@@ -158,9 +163,7 @@ impl Session {
     /// Takes back what is being dragged.
     pub fn take_back(&mut self) {
         if let (Some(dragged), Some(document)) = (self.moves.dragged.take(), &mut self.document) {
-            if let Some(shown) = document.poses.get_mut(dragged.part) {
-                *shown = dragged.from;
-            }
+            document.poses = dragged.from;
             document.extent = dragged.extent;
         }
     }
@@ -168,16 +171,16 @@ impl Session {
     /// Moves a part, which must be possible.
     pub(super) fn move_part(&mut self, motion: &Motion) {
         let Some(document) = &self.document else { return };
-        let (Some(pose), mut poses) = (motion.moved(document), document.poses.clone()) else {
+        let Some(pose) = motion.moved(document) else {
             return;
         };
-        poses[motion.part] = pose;
+        let poses = document.poses_with(motion.part, pose);
         let verb = match (motion.turn == DQuat::IDENTITY, motion.shift_mm == DVec3::ZERO) {
             (true, _) => "move",
             (_, true) => "turn",
             _ => "move and turn",
         };
-        let name = format!("{verb} {}", document.part_name(motion.part));
+        let name = format!("{verb} {}", document.moving_name(motion.part));
         self.place(poses);
         if let (true, Some(document)) = (motion.goes_on, &self.document) {
             self.moves.steps.go_on(&name, &document.poses);
@@ -208,7 +211,7 @@ impl Session {
         let Some(document) = &self.document else { return };
         let moves = &mut self.moves;
         if moves.generation != Some(document.generation) {
-            moves.steps = Steps::beginning(&document.poses);
+            moves.steps = Steps::beginning(&document.poses, document.groups().clone());
             moves.generation = Some(document.generation);
             moves.dragged = None;
             return;
@@ -223,7 +226,9 @@ impl Session {
             .collect();
         let name = match elsewhere[..] {
             [] => return,
-            [part] => format!("motion of {} on the board", document.part_name(part)),
+            [part, ..] if document.groups().together(part) == elsewhere => {
+                format!("motion of {} on the board", document.moving_name(part))
+            }
             _ => format!("motion of {} parts on the board", elsewhere.len()),
         };
         moves.steps.record(&name, &document.poses);
@@ -234,9 +239,13 @@ impl Session {
         self.watch_moves();
         let steps = &mut self.moves.steps;
         let name = if back { steps.undo() } else { steps.redo() }?;
-        let poses = steps.poses().to_vec();
+        let (poses, groups) = (steps.poses().to_vec(), steps.groups().clone());
         self.instructions.follow(&poses, back);
+        let is_regrouped = self.regroup(groups);
         self.place(poses);
+        if is_regrouped {
+            self.bake();
+        }
         let done = if back { "Undone" } else { "Redone" };
         self.notes.add(Severity::Info, format!("{done}: {name}"));
         Some(name)

@@ -15,6 +15,7 @@ use super::connections::ConnectionsFound;
 use super::document::Document;
 use super::fitting::FitsFound;
 use super::flashing::FlashUpdate;
+use super::grouped::Grouped;
 use super::introduction::RigSent;
 use super::joints::JointsFound;
 use super::purpose::Purpose;
@@ -54,6 +55,8 @@ pub enum Update {
     Baked {
         /// Id of the document.
         generation: u64,
+        /// What was baked.
+        of: Arc<Grouped>,
         /// The collision model, or one line with the reason of the failure.
         result: Result<CollisionModel, String>,
     },

@@ -66,7 +66,10 @@ impl Session {
             Intent::Stop => self.stop(),
             Intent::ClearFault => self.request(ToDevice::ClearFault),
             Intent::Home => self.request(ToDevice::Home),
-            Intent::Select(part) => self.selected = part,
+            Intent::Select(part) => self.select(part),
+            Intent::SelectThese(parts) => self.select_these(&parts),
+            Intent::SelectAlso(parts) => self.select_also(&parts),
+            Intent::Group(intent) => self.perform_on_groups(&intent),
             Intent::Hide(part, hidden) => self.hide(part, hidden),
             Intent::Isolate(part) => self.isolate(part),
             Intent::ShowAll => self.show_all(),
@@ -155,7 +158,7 @@ impl Session {
             return;
         };
         document.baked = None;
-        let (model, generation) = (Arc::clone(&document.model), document.generation);
+        let (grouped, generation) = (Arc::clone(&document.grouped), document.generation);
         let mut slot = mortise_bake::SLOT_BYTES;
         if let Some(connection) = self.connection_mut() {
             slot = u64::from(connection.capabilities.scene_capacity);
@@ -166,17 +169,19 @@ impl Session {
         let wanted = match self.method {
             Method::DistanceField => Wanted::Planned(Request {
                 flash_bytes: slot,
+                grabbable: grouped.grabbable(),
                 ..Request::default()
             }),
             method => Wanted::Described(BakeOptions {
                 method,
                 image_limit_bytes: slot,
+                grabbable: grouped.grabbable(),
                 ..BakeOptions::default()
             }),
         };
         work::bake(
             &self.outbox,
-            model,
+            grouped,
             generation,
             wanted,
             self.cache.clone(),
@@ -295,12 +300,16 @@ impl Session {
     }
 
     fn grab(&mut self, part: usize) {
-        self.selected = Some(part);
-        // The part in hand is always seen.
-        self.hide(part, false);
-        let Some(scene_part) = self.document.as_ref().and_then(|d| d.scene_part(part)) else {
-            return;
-        };
+        let Some(document) = &self.document else { return };
+        let (together, scene_part) = (document.groups().together(part), document.scene_part(part));
+        if self.selection() != together {
+            self.select(Some(part));
+        }
+        // What is in hand is always seen.
+        for part in together {
+            self.hide(part, false);
+        }
+        let Some(scene_part) = scene_part else { return };
         if self.device() == Some(DeviceState::Active) {
             self.request(ToDevice::Release);
         }

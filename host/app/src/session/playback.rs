@@ -154,7 +154,7 @@ impl Session {
                 format!("{name}: {:.1} s", run.duration_s())
             } else {
                 format!(
-                    "{name}: {:.1} s; the open file has another collision model, so no part is moved: open the file that was recorded",
+                    "{name}: {:.1} s; the open file has another collision model, so no part is moved: open the file that was recorded, with its parts grouped as they were",
                     run.duration_s()
                 )
             },
@@ -217,11 +217,8 @@ impl Session {
             return;
         }
         for (part, pose) in playback.run().poses(playback.at_s) {
-            if let Some(shown) = document
-                .model_part(part)
-                .and_then(|part| document.poses.get_mut(part))
-            {
-                *shown = pose::from_wire(&pose);
+            if let Some(part) = document.model_part(part) {
+                document.put(part, pose::from_wire(&pose));
             }
         }
     }

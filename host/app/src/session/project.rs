@@ -10,6 +10,7 @@ use mortise_protocol::parameter::PARAMETERS;
 
 use super::document::Document;
 use super::fits::FitChoice;
+use super::kept_groups::{joined, kept};
 use super::link::Link;
 use super::notes::Severity;
 use super::state::{GUIDE_CAP_N, Looks, OwnParameters, Session};
@@ -62,6 +63,7 @@ pub fn capture(session: &Session, document: &Document) -> Project {
             sha256: document.sha256.clone(),
         },
         parts: parts.collect(),
+        groups: kept(document),
         fits: fits.collect(),
         settings: settings(session),
         rig: Some(session.chosen.to_string()),
@@ -129,9 +131,14 @@ pub fn apply(session: &mut Session, project: &Project, source: &Source) {
         };
         Some((id, choice))
     });
-    let fits: BTreeMap<TargetId, FitChoice> = fits.collect();
+    let mut fits: BTreeMap<TargetId, FitChoice> = fits.collect();
+    let (groups, left_out) = joined(document, &project.groups, &poses);
+    // The surfaces of a group that is not there.
+    let is_left_out = |part: usize| left_out.iter().any(|group| group.parts.contains(&part));
+    fits.retain(|id, _| !is_left_out(id.moving_part) && !is_left_out(id.fixed_part));
     let counts = [
         (moved, "part moved", "parts moved"),
+        (groups.iter().count(), "group", "groups"),
         (
             hidden.iter().filter(|hidden| **hidden).count(),
             "part hidden",
@@ -140,11 +147,12 @@ pub fn apply(session: &mut Session, project: &Project, source: &Source) {
         (fits.len(), "choice of a fit", "choices of fits"),
         (project.settings.count(), "setting", "settings"),
     ];
-    session.fits = fits;
     if let Some(document) = &mut session.document {
         document.hidden = hidden;
     }
     session.place(poses);
+    session.regroup(groups);
+    session.fits = fits;
     session.view.clone_from(&project.view);
     session.looks = Some(Looks {
         signals: project.signals.clone(),
@@ -156,6 +164,9 @@ pub fn apply(session: &mut Session, project: &Project, source: &Source) {
         .map(|(count, one, many)| format!("{count} {}", if count == 1 { one } else { many }))
         .collect();
     report(session, project, source, same, &restored, &missing);
+    for group in left_out {
+        session.notes.add(Severity::Warning, group.why);
+    }
 }
 
 fn apply_settings(session: &mut Session, project: &Project) {

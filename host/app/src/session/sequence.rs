@@ -11,6 +11,8 @@ use mortise_task::report::{self, Sense};
 use mortise_task::sequence::Sequence as Found;
 use mortise_task::{Assembly, Motion};
 
+use super::grouped::Grouped;
+
 /// Least distance of the boxes of parts that are apart, over the radius of the assembly.
 const BETWEEN: f64 = 0.06;
 /// Speed of a turn beside that of a slide: the share of the assembly's radius that a point is from the axis.
@@ -118,6 +120,16 @@ impl Sequence {
             file: all.iter().map(|part| assembly.placement(*part)).collect(),
             radius,
         }
+    }
+
+    /// The same steps with the parts of each group in place of the one that stands for it. `numbers` are those that the document gives to the parts here.
+    pub(super) fn with_groups(mut self, grouped: &Grouped, numbers: &[usize]) -> Self {
+        for step in &mut self.steps {
+            let parts = step.parts.iter().filter_map(|&part| numbers.get(part));
+            step.parts = parts.flat_map(|&part| grouped.groups.together(part)).collect();
+        }
+        self.file = grouped.file_poses();
+        self
     }
 
     /// Poses of all parts after `done` steps, with its fraction as the share of the way that the next one has gone.

@@ -97,6 +97,12 @@ impl Sequencing {
         self.searches += 1;
     }
 
+    /// Ends the search under way and forgets what was found, as for parts that are grouped otherwise.
+    pub(super) fn forget(&mut self) {
+        self.cancel();
+        (self.found, self.shown) = (None, None);
+    }
+
     /// Takes in what a search found, unless it is no longer wanted.
     pub(super) fn take_in(&mut self, found: SequenceFound) {
         if self.since.is_some() && found.id == self.searches {

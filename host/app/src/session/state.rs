@@ -1,6 +1,6 @@
 //! The window's state, and what follows from it without a change.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -100,8 +100,10 @@ pub struct Session {
     pub lost: Option<Lost>,
     /// Outcome of the last insertion, until the next one.
     pub verdict: Option<Verdict>,
-    /// Selected part.
+    /// The selected part that keys, handles and panels act on.
     pub selected: Option<usize>,
+    /// Parts that are selected beside it.
+    pub also_selected: BTreeSet<usize>,
     /// The last sample of the loop.
     pub telemetry: Option<Box<Telemetry>>,
     /// The samples of the last seconds.
@@ -195,6 +197,7 @@ impl Session {
             lost: None,
             verdict: None,
             selected: None,
+            also_selected: BTreeSet::new(),
             telemetry: None,
             history: History::default(),
             parameters: PARAMETERS.iter().map(|row| row.default).collect(),
@@ -320,13 +323,20 @@ impl Session {
         }
     }
 
-    /// Index of the held part.
+    /// Index of the held part; of a held group that of its first part.
     pub fn grabbed(&self) -> Option<usize> {
         if self.device() != Some(DeviceState::Active) {
             return None;
         }
         let (part, _) = self.telemetry.as_ref()?.object.as_ref()?;
         self.document.as_ref()?.model_part(*part)
+    }
+
+    /// Whether a part is held, by itself or with its group.
+    pub fn is_held(&self, part: usize) -> bool {
+        let document = self.document.as_ref();
+        self.grabbed()
+            .is_some_and(|held| document.is_some_and(|document| document.groups().first(part) == held))
     }
 
     /// Held part and the pose that the handle commands, mm: it differs from the part's own pose by the coupling's deflection under contact.

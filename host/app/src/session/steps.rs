@@ -8,6 +8,8 @@ use std::collections::VecDeque;
 
 use glam::DAffine3;
 
+use super::groups::Groups;
+
 /// Most steps kept: the oldest one is forgotten first.
 pub const MOST_STEPS: usize = 200;
 
@@ -24,6 +26,8 @@ struct Change {
 struct Step {
     name: String,
     changes: Vec<Change>,
+    /// Groups before and after, where it has changed them.
+    regrouped: Option<[Groups; 2]>,
 }
 
 /// Where the parts are, and the steps before and after.
@@ -33,13 +37,15 @@ pub struct Steps {
     /// The step that is redone next is the last one.
     undone: Vec<Step>,
     now: Vec<DAffine3>,
+    groups: Groups,
 }
 
 impl Steps {
-    /// A history that begins with the parts at these poses.
-    pub fn beginning(poses: &[DAffine3]) -> Self {
+    /// A history that begins with the parts at these poses and in these groups.
+    pub fn beginning(poses: &[DAffine3], groups: Groups) -> Self {
         Self {
             now: poses.to_vec(),
+            groups,
             ..Self::default()
         }
     }
@@ -49,28 +55,55 @@ impl Steps {
         &self.now
     }
 
+    /// How the history has the parts grouped.
+    pub fn groups(&self) -> &Groups {
+        &self.groups
+    }
+
     /// Adds a step, after which the parts are at `poses`, and forgets what was undone. No effect where nothing has moved, or there is another number of parts.
     /// Returns whether a step was added.
     pub fn record(&mut self, name: &str, poses: &[DAffine3]) -> bool {
+        let changes = self.changes(poses);
+        !changes.is_empty() && self.add(name, changes, None, poses)
+    }
+
+    /// Adds a step that groups the parts otherwise, after which they are at `poses`. Returns whether a step was added.
+    pub fn regroup(&mut self, name: &str, poses: &[DAffine3], groups: Groups) -> bool {
+        if groups == self.groups {
+            return self.record(name, poses);
+        }
+        let before = std::mem::replace(&mut self.groups, groups.clone());
+        self.add(name, self.changes(poses), Some([before, groups]), poses)
+    }
+
+    /// The parts that are elsewhere at `poses`; none where there is another number of parts.
+    fn changes(&self, poses: &[DAffine3]) -> Vec<Change> {
         if poses.len() != self.now.len() {
-            return false;
+            return Vec::new();
         }
         let pairs = self.now.iter().zip(poses).enumerate();
-        let changes: Vec<Change> = pairs
+        pairs
             .filter(|(_, (before, after))| before != after)
             .map(|(part, (before, after))| Change {
                 part,
                 before: *before,
                 after: *after,
             })
-            .collect();
-        if changes.is_empty() {
-            return false;
-        }
+            .collect()
+    }
+
+    fn add(
+        &mut self,
+        name: &str,
+        changes: Vec<Change>,
+        regrouped: Option<[Groups; 2]>,
+        poses: &[DAffine3],
+    ) -> bool {
         self.undone.clear();
         self.done.push_back(Step {
             name: name.to_owned(),
             changes,
+            regrouped,
         });
         if self.done.len() > MOST_STEPS {
             self.done.pop_front();
@@ -89,7 +122,8 @@ impl Steps {
         }
         let (before, last) = (&self.done[count - 2], &self.done[count - 1]);
         let parts = |step: &Step| step.changes.iter().map(|change| change.part).collect::<Vec<_>>();
-        if before.name == last.name && parts(before) == parts(last) {
+        let regroups = before.regrouped.is_some() || last.regrouped.is_some();
+        if !regroups && before.name == last.name && parts(before) == parts(last) {
             let last = self.done.pop_back();
             let ends = last.into_iter().flat_map(|step| step.changes);
             let onto = self
@@ -117,6 +151,7 @@ impl Steps {
             self.done.push_back(Step {
                 name: name.to_owned(),
                 changes: Vec::new(),
+                regrouped: None,
             });
         }
     }
@@ -131,11 +166,24 @@ impl Steps {
         self.undone.last().map(|step| step.name.as_str())
     }
 
+    /// Whether the step that is undone next, or redone, groups the parts otherwise.
+    pub fn regroups(&self, back: bool) -> bool {
+        let next = if back {
+            self.done.back()
+        } else {
+            self.undone.last()
+        };
+        next.is_some_and(|step| step.regrouped.is_some())
+    }
+
     /// Goes back by one step; returns its name. The parts are then at [`Self::poses`].
     pub fn undo(&mut self) -> Option<String> {
         let step = self.done.pop_back()?;
         for change in &step.changes {
             self.now[change.part] = change.before;
+        }
+        if let Some([before, _]) = &step.regrouped {
+            self.groups.clone_from(before);
         }
         let name = step.name.clone();
         self.undone.push(step);
@@ -147,6 +195,9 @@ impl Steps {
         let step = self.undone.pop()?;
         for change in &step.changes {
             self.now[change.part] = change.after;
+        }
+        if let Some([_, after]) = &step.regrouped {
+            self.groups.clone_from(after);
         }
         let name = step.name.clone();
         self.done.push_back(step);
@@ -160,6 +211,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::session::groups::Group;
 
     fn at(x: f64) -> DAffine3 {
         DAffine3::from_translation(x * DVec3::X)
@@ -167,7 +219,7 @@ mod tests {
 
     #[test]
     fn steps_are_undone_and_redone_by_name() {
-        let mut steps = Steps::beginning(&[at(0.0), at(1.0)]);
+        let mut steps = Steps::beginning(&[at(0.0), at(1.0)], Groups::default());
         assert_eq!((steps.undo(), steps.redo()), (None, None));
         assert!(steps.record("move a", &[at(5.0), at(1.0)]));
         assert!(!steps.record("nothing", &[at(5.0), at(1.0)]));
@@ -186,7 +238,7 @@ mod tests {
 
     #[test]
     fn a_key_that_is_held_down_is_one_step() {
-        let mut steps = Steps::beginning(&[at(0.0), at(1.0)]);
+        let mut steps = Steps::beginning(&[at(0.0), at(1.0)], Groups::default());
         for x in 1..=10 {
             assert!(steps.go_on("nudge a", &[at(f64::from(x)), at(1.0)]));
         }
@@ -205,7 +257,7 @@ mod tests {
     /// The slider moves one part after the other, back to where it began, and on again.
     #[test]
     fn a_slider_that_is_dragged_is_one_step() {
-        let mut steps = Steps::beginning(&[at(0.0), at(0.0)]);
+        let mut steps = Steps::beginning(&[at(0.0), at(0.0)], Groups::default());
         assert!(steps.record("slide", &[at(1.0), at(0.0)]));
         assert!(steps.record("slide", &[at(2.0), at(0.0)]));
         for poses in [[3.0, 0.0], [3.0, 1.0], [2.0, 0.0], [1.0, 0.0], [1.0, 5.0]] {
@@ -219,8 +271,31 @@ mod tests {
     }
 
     #[test]
+    fn a_change_of_groups_is_a_step_though_nothing_moves() {
+        let poses = [at(0.0), at(1.0), at(2.0)];
+        let mut steps = Steps::beginning(&poses, Groups::default());
+        let group = Group::new("g".into(), vec![0, 1], &poses, &poses).expect("two parts");
+        let groups = Groups::default().with(group);
+        assert!(!steps.regroup("nothing", &poses, Groups::default()));
+        assert!(steps.regroup("group g", &poses, groups.clone()));
+        let moved = [at(5.0), at(6.0), at(2.0)];
+        assert!(steps.go_on("move g", &moved));
+        assert!(steps.regroup("ungroup g", &moved, Groups::default()));
+        assert!(steps.regroups(true) && !steps.regroups(false));
+        assert_eq!(steps.undo().as_deref(), Some("ungroup g"));
+        assert!(!steps.regroups(true) && steps.regroups(false));
+        assert_eq!((steps.groups(), steps.poses()), (&groups, &moved[..]));
+        assert_eq!(steps.undo().as_deref(), Some("move g"));
+        assert_eq!((steps.groups(), steps.poses()), (&groups, &poses[..]));
+        assert_eq!(steps.undo().as_deref(), Some("group g"));
+        assert!(steps.groups().is_empty());
+        assert_eq!(steps.redo().as_deref(), Some("group g"));
+        assert_eq!(steps.groups(), &groups);
+    }
+
+    #[test]
     fn the_oldest_steps_are_forgotten() {
-        let mut steps = Steps::beginning(&[at(0.0)]);
+        let mut steps = Steps::beginning(&[at(0.0)], Groups::default());
         for x in 1..=MOST_STEPS + 7 {
             steps.record("move", &[at(x as f64)]);
         }
@@ -252,7 +327,7 @@ mod tests {
         #[test]
         fn the_history_is_a_list_of_states(doings in doings()) {
             let start = vec![at(0.0); 4];
-            let mut steps = Steps::beginning(&start);
+            let mut steps = Steps::beginning(&start, Groups::default());
             let (mut states, mut place) = (vec![start], 0);
             for doing in doings {
                 match doing {

@@ -9,6 +9,7 @@ use mortise_brep::CadModel;
 use mortise_task::{Assembly, Deadline, sequence};
 
 use super::ask::write;
+use super::grouped::Grouped;
 use super::outbox::Update;
 use super::sequence::Sequence;
 use super::sequencing::SequenceFound;
@@ -46,10 +47,10 @@ impl Session {
     pub(super) fn find_sequence(&mut self) {
         let Some(document) = &self.document else { return };
         let (id, cancel) = self.sequencing.begin(document.generation);
-        let (model, outbox) = (Arc::clone(&document.model), self.outbox.clone());
+        let (grouped, outbox) = (Arc::clone(&document.grouped), self.outbox.clone());
         let title = document.title.clone();
         spawn("mortise-sequence", move || {
-            if let Some(result) = search(&title, &model, &cancel) {
+            if let Some(result) = search(&title, &grouped, &cancel) {
                 outbox.send(Update::Sequence(SequenceFound { id, result }));
             }
         });
@@ -83,23 +84,25 @@ impl Session {
             self.note_step(NAME);
         }
         if next.is_some() {
-            self.selected = next;
+            self.select(next);
         }
         self.sequencing.put(done, poses);
     }
 }
 
-/// The steps of a model, with their report, or why there are none; `None` when it was cancelled. Cost: seconds, at most [`LONGEST`] and some; after a cancel
+/// The steps of a model, each group as one part, with their report, or why there are none; `None` when it was cancelled. Cost: seconds, at most [`LONGEST`] and some; after a cancel
 /// the contacts of the parts are still found, and a search ends within a sweep of one pair of them.
-fn search(title: &str, model: &CadModel, cancel: &Cancel) -> Option<Result<Sequence, String>> {
-    let assembly = match Assembly::new(model.clone()) {
+fn search(title: &str, grouped: &Grouped, cancel: &Cancel) -> Option<Result<Sequence, String>> {
+    let (model, numbers) = grouped.bodies();
+    let assembly = match Assembly::new(CadModel::clone(&model)) {
         Ok(assembly) => assembly,
         Err(error) => return Some(Err(error.to_string())),
     };
     let all: Vec<usize> = (0..assembly.count()).collect();
     let until = Deadline::from(LONGEST).or_stopped(cancel.flag());
     let found = sequence::disassemble(&assembly, &all, until);
-    (!cancel.is_set()).then(|| Ok(Sequence::new(title, &assembly, &found)))
+    let steps = || Sequence::new(title, &assembly, &found).with_groups(grouped, &numbers);
+    (!cancel.is_set()).then(|| Ok(steps()))
 }
 
 #[cfg(test)]
@@ -113,8 +116,8 @@ mod tests {
     fn a_cancelled_search_gives_nothing() {
         let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
         let cancel = Cancel::default();
-        assert!(search("sample", &document.model, &cancel).is_some());
+        assert!(search("sample", &document.grouped, &cancel).is_some());
         cancel.set();
-        assert_eq!(search("sample", &document.model, &cancel), None);
+        assert_eq!(search("sample", &document.grouped, &cancel), None);
     }
 }

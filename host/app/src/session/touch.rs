@@ -36,10 +36,11 @@ impl fmt::Display for Touch {
 }
 
 impl Touch {
-    /// Feature of part `part` that touches at `point` (world, mm), for the faces that the board reported.
+    /// Feature of part `part`, or of its group, that touches at `point` (world, mm), for the faces that the board reported.
     pub fn of(document: &Document, part: usize, faces: [u16; 2], point: DVec3) -> Self {
+        let model = &document.grouped.model;
         let (Some(shape), Some(pose)) = (
-            (document.model.parts.get(part)).and_then(|part| document.model.shapes.get(part.shape)),
+            (model.parts.get(part)).and_then(|part| model.shapes.get(part.shape)),
             document.poses.get(part),
         ) else {
             return Self::Face;

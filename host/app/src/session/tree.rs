@@ -2,6 +2,8 @@
 
 use mortise_brep::CadModel;
 
+use super::groups::Groups;
+
 /// A node of the tree.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Branch {
@@ -12,17 +14,53 @@ pub enum Branch {
         /// In file order.
         children: Vec<Branch>,
     },
+    /// Parts that move as one.
+    Group {
+        /// Its name.
+        name: String,
+        /// Its parts, ascending.
+        parts: Vec<usize>,
+    },
     /// A part, by its index.
     Part(usize),
 }
 
-/// The tree of a model's parts. Neighbours with the same path share a subassembly; the order is the file's.
-pub fn tree(model: &CadModel) -> Vec<Branch> {
-    let mut roots = Vec::new();
+impl Branch {
+    /// The parts of it, in its order.
+    pub fn parts(&self) -> Vec<usize> {
+        match self {
+            Self::Assembly { children, .. } => children.iter().flat_map(Self::parts).collect(),
+            Self::Group { parts, .. } => parts.clone(),
+            Self::Part(part) => vec![*part],
+        }
+    }
+}
+
+/// The tree of a model's parts: groups first, then the others. Neighbours with the same path share a subassembly; the order is the file's.
+pub fn tree(model: &CadModel, groups: &Groups) -> Vec<Branch> {
+    let mut roots: Vec<Branch> = (groups.iter())
+        .map(|group| Branch::Group {
+            name: group.name.clone(),
+            parts: group.parts().to_vec(),
+        })
+        .collect();
     for (index, part) in model.parts.iter().enumerate() {
-        insert(&mut roots, &part.path, index);
+        if groups.of(index).is_none() {
+            insert(&mut roots, &part.path, index);
+        }
     }
     roots
+}
+
+/// Name of the subassembly that consists of just these parts, ascending; of several within one another the innermost.
+pub fn assembly_of<'a>(branches: &'a [Branch], parts: &[usize]) -> Option<&'a str> {
+    branches.iter().find_map(|branch| match branch {
+        Branch::Assembly { name, children } => {
+            let inner = assembly_of(children, parts);
+            inner.or_else(|| (branch.parts() == parts).then_some(name.as_str()))
+        }
+        _ => None,
+    })
 }
 
 fn insert(branches: &mut Vec<Branch>, path: &[String], part: usize) {
@@ -60,7 +98,15 @@ fn matching(branches: &[Branch], model: &CadModel, words: &[String]) -> Vec<Bran
             let name = model.parts.get(*part).map(|part| part.name.as_str());
             name.is_some_and(has).then(|| branch.clone())
         }
-        Branch::Assembly { name, .. } if has(name) => Some(branch.clone()),
+        Branch::Assembly { name, .. } | Branch::Group { name, .. } if has(name) => Some(branch.clone()),
+        Branch::Group { name, parts } => {
+            let of_part = |part: &&usize| model.parts.get(**part).is_some_and(|part| has(&part.name));
+            let parts: Vec<usize> = parts.iter().filter(of_part).copied().collect();
+            (!parts.is_empty()).then(|| Branch::Group {
+                name: name.clone(),
+                parts,
+            })
+        }
         Branch::Assembly { name, children } => {
             let children = matching(children, model, words);
             (!children.is_empty()).then(|| Branch::Assembly {
@@ -79,6 +125,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::session::groups::Group;
 
     #[test]
     fn parts_hang_under_their_subassemblies_in_file_order() {
@@ -104,7 +151,7 @@ mod tests {
             children,
         };
         assert_eq!(
-            tree(&model),
+            tree(&model, &Groups::default()),
             vec![
                 Branch::Part(0),
                 group(
@@ -131,11 +178,32 @@ mod tests {
     }
 
     fn parts_of(branches: &[Branch]) -> Vec<usize> {
-        let of = |branch: &Branch| match branch {
-            Branch::Part(part) => vec![*part],
-            Branch::Assembly { children, .. } => parts_of(children),
+        branches.iter().flat_map(Branch::parts).collect()
+    }
+
+    #[test]
+    fn groups_come_first_and_a_subassembly_is_known_by_its_parts() {
+        let model = CadModel {
+            parts: vec![
+                part(&[], "base"),
+                part(&["gearbox"], "cover"),
+                part(&["gearbox", "shaft"], "key"),
+                part(&["gearbox", "shaft"], "wheel"),
+            ],
+            ..CadModel::default()
         };
-        branches.iter().flat_map(of).collect()
+        let poses = vec![DAffine3::IDENTITY; 4];
+        let plain = tree(&model, &Groups::default());
+        let name = |parts: &[usize]| assembly_of(&plain, parts);
+        assert_eq!(name(&[2, 3]), Some("shaft"));
+        assert_eq!(name(&[1, 2, 3]), Some("gearbox"));
+        assert_eq!([name(&[1, 2]), name(&[0])], [None; 2]);
+        let group = Group::new("lid".into(), vec![0, 2], &poses, &poses).expect("two parts");
+        let all = tree(&model, &Groups::default().with(group));
+        assert_eq!(parts_of(&all), [0, 2, 1, 3]);
+        let find = |query: &str| parts_of(&found(&all, &model, query));
+        assert_eq!(find("lid"), [0, 2], "by the group's name");
+        assert_eq!(find("key"), [2], "or that of one of its parts");
     }
 
     #[test]
@@ -149,7 +217,7 @@ mod tests {
             ],
             ..CadModel::default()
         };
-        let find = |query: &str| parts_of(&found(&tree(&model), &model, query));
+        let find = |query: &str| parts_of(&found(&tree(&model, &Groups::default()), &model, query));
         assert_eq!(find("COVER"), [0, 1, 3]);
         assert_eq!(find(" cover  plate"), [0, 3]);
         assert_eq!(find("gear"), [1, 2]);
@@ -164,7 +232,7 @@ mod tests {
                 parts: names.iter().enumerate().map(|(n, name)| part(&[["u", "v"][n % 2]], name)).collect(),
                 ..CadModel::default()
             };
-            let all = tree(&model);
+            let all = tree(&model, &Groups::default());
             let hits = parts_of(&found(&all, &model, &query));
             prop_assert!(hits.is_sorted_by(|a, b| a < b), "{hits:?}");
             let words: Vec<String> = query.to_lowercase().split_whitespace().map(str::to_owned).collect();

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use mortise_protocol::image::NO_FACE;
 use mortise_protocol::message::{DeviceState, ResetReason, Telemetry, ToDevice, TouchingPair};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
 use super::ask::answer;
 use super::document::Document;
+use super::grouped::Grouped;
 use super::history::Sample;
 use super::insertion::Wall;
 use super::intent::Intent;
@@ -54,7 +56,11 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
                 job.fraction = Some(fraction);
             }
         }
-        Update::Baked { generation, result } if is_awaited(session, generation) => {
+        Update::Baked {
+            generation,
+            of,
+            result,
+        } if is_awaited(session, generation) && has_groups(session, &of) => {
             session.job = None;
             match result {
                 Ok(model) => baked_of(session, model),
@@ -107,6 +113,12 @@ fn is_awaited(session: &Session, generation: u64) -> bool {
         .is_some_and(|job| job.generation == generation)
 }
 
+/// Whether a collision model has the groups of the open document.
+fn has_groups(session: &Session, of: &Arc<Grouped>) -> bool {
+    let document = session.document.as_ref();
+    document.is_some_and(|document| Arc::ptr_eq(&document.grouped, of))
+}
+
 fn opened(session: &mut Session, Imported { document, saved }: Imported) {
     session.note_project();
     let parts = document.model.parts.len();
@@ -122,7 +134,7 @@ fn opened(session: &mut Session, Imported { document, saved }: Imported) {
     for warning in &document.model.warnings {
         session.notes.add(Severity::Warning, warning.clone());
     }
-    session.selected = None;
+    session.select(None);
     session.drop_fits();
     session.playback = None;
     session.before_run = None;
@@ -311,9 +323,7 @@ fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
         && let Some(part) = document.model_part(*part)
     {
         let object = pose::from_wire(object);
-        if let Some(shown) = document.poses.get_mut(part) {
-            *shown = object;
-        }
+        document.put(part, object);
         if session.held.is_none_or(|(held, _)| held != part) {
             session.held = Some((part, pose::from_wire(&telemetry.handle).inverse() * object));
             session.verdict = None;
@@ -366,8 +376,15 @@ fn blocker(document: &Document, held: usize, telemetry: &Telemetry, walls: &[Wal
 fn met(document: &Document, held: usize, pair: &TouchingPair, part: usize, walls: &[Wall]) -> String {
     let faces = [pair.static_face, pair.static_edge_face];
     let touch = Touch::of(document, part, faces, pose::point_from_wire(pair.point));
+    let known: Vec<u32> = (faces.iter())
+        .filter(|&&face| face != NO_FACE)
+        .map(|&face| face.into())
+        .collect();
+    let (owner, _) = document.owner(part, &known);
+    let is_its = |wall: &&Wall| owner.is_none() || document.owner(part, &wall.faces).0 == owner;
     let bores: Vec<&Wall> = (walls.iter())
         .filter(|wall| wall.part == part && wall.inner)
+        .filter(is_its)
         .collect();
     let met = (bores.iter()).position(|bore| faces.iter().any(|&f| bore.faces.contains(&u32::from(f))));
     let what = match (touch, met) {
@@ -375,7 +392,7 @@ fn met(document: &Document, held: usize, pair: &TouchingPair, part: usize, walls
         (Touch::Face, Some(_)) => "wall".to_owned(),
         (other, _) => other.to_string(),
     };
-    let name = document.part_name(part);
+    let name = document.owner_name(part, &known);
     let own = Touch::of(
         document,
         held,
@@ -451,7 +468,6 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>
 mod tests {
     use glam::DAffine3;
     use mortise_brep::{CadModel, Face, Frame, Mesh, Part, Shape, Surface};
-    use mortise_protocol::image::NO_FACE;
 
     use super::*;
     use crate::session::insertion::local_walls;

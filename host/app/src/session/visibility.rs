@@ -10,17 +10,18 @@ impl Session {
         }
     }
 
-    /// Hides all parts but this one and the held one.
+    /// Hides all parts but this one, those selected with it, and the held ones.
     pub(super) fn isolate(&mut self, part: usize) {
-        let held = self.grabbed();
-        let Some(document) = &mut self.document else {
-            return;
-        };
-        if part >= document.hidden.len() {
+        let count = self.document.as_ref().map_or(0, |document| document.hidden.len());
+        if part >= count {
             return;
         }
-        for (index, hidden) in document.hidden.iter_mut().enumerate() {
-            *hidden = index != part && Some(index) != held;
+        let with_selection = self.is_selected(part);
+        let is_seen =
+            |other| other == part || self.is_held(other) || with_selection && self.is_selected(other);
+        let hidden = (0..count).map(|other| !is_seen(other)).collect();
+        if let Some(document) = &mut self.document {
+            document.hidden = hidden;
         }
     }
 

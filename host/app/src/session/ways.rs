@@ -1,7 +1,9 @@
 //! Ways in that guidance follows: those of the assembly itself, and that of the fit which the operator chose. Pure.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use mortise_brep::CadModel;
 use mortise_mating::recognise::Target;
 
 use super::threads::Cancel;
@@ -18,8 +20,8 @@ pub struct Ways {
 
 /// The ways of a part in the assembly.
 pub struct WaysFound {
-    /// Id of the document.
-    pub generation: u64,
+    /// The model in which they were searched.
+    pub model: Arc<CadModel>,
     /// The part.
     pub moving: usize,
     /// Its ways, with the parts in which it sits.

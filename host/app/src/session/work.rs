@@ -6,12 +6,13 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use mortise_bake::{
-    BakeError, BakeOptions, Baked, Cache, NoCache, Planned, Progress, Request, Stage,
+    BakeError, BakeOptions, BakeReport, Baked, Cache, NoCache, Planned, Progress, Request, Stage,
     bake as bake_as_described, plan_with,
 };
 use mortise_brep::CadModel;
 
 use super::document::Document;
+use super::grouped::Grouped;
 use super::outbox::{CollisionModel, Imported, Outbox, Update};
 use super::saved::Saved;
 use super::threads::{Cancel, spawn};
@@ -95,10 +96,10 @@ pub fn import(
     });
 }
 
-/// Bakes a model; `cache` has and keeps results of other bakes.
+/// Bakes a model, each group as one part; `cache` has and keeps results of other bakes.
 pub fn bake(
     outbox: &Outbox,
-    model: Arc<CadModel>,
+    grouped: Arc<Grouped>,
     generation: u64,
     wanted: Wanted,
     cache: Option<Arc<FolderCache>>,
@@ -108,30 +109,42 @@ pub fn bake(
     spawn("mortise-bake", move || {
         let reports = Reports::new(&outbox, generation, &cancel);
         let progress = |progress: Progress| reports.send(overall(&progress), || Some(doing(&progress)));
-        let result = match collision_model(&model, &wanted, cache.as_deref(), &progress) {
+        let (model, numbers) = grouped.bodies();
+        let result = match collision_model(&model, &numbers, &wanted, cache.as_deref(), &progress) {
             Err(BakeError::Cancelled) => return,
             Err(error) => Err(error.to_string()),
             Ok(result) => result,
         };
-        outbox.send(Update::Baked { generation, result });
+        outbox.send(Update::Baked {
+            generation,
+            of: grouped,
+            result,
+        });
     });
 }
 
-/// The model wanted, or one line with the reason why none fits.
+/// The model wanted, or one line with the reason why none fits. Its report has the `numbers` of the parts in place of those in `model`.
 fn collision_model(
     model: &CadModel,
+    numbers: &[usize],
     wanted: &Wanted,
     cache: Option<&FolderCache>,
     progress: &(dyn Fn(Progress<'_>) -> ControlFlow<()> + Sync),
 ) -> Result<Result<CollisionModel, String>, BakeError> {
+    let of_document = |mut report: BakeReport| {
+        for part in &mut report.parts {
+            part.model_part = numbers[part.model_part];
+        }
+        report
+    };
     let request = match wanted {
         Wanted::Described(options) => {
-            return bake_as_described(model, options, progress).map(|baked| {
-                Ok(CollisionModel {
-                    baked: Arc::new(baked),
-                    reached: None,
-                })
-            });
+            let Baked { image, report } = bake_as_described(model, options, progress)?;
+            let report = of_document(report);
+            return Ok(Ok(CollisionModel {
+                baked: Arc::new(Baked { image, report }),
+                reached: None,
+            }));
         }
         Wanted::Planned(request) => request,
     };
@@ -142,7 +155,7 @@ fn collision_model(
         return Ok(Err(reached));
     }
     let Planned { plan, image, .. } = planned;
-    let mut report = plan.report;
+    let mut report = of_document(plan.report);
     report
         .warnings
         .extend(cache.iter().flat_map(|cache| cache.finish()));
@@ -197,7 +210,7 @@ mod tests {
                 cell_mm: Some(4.0),
                 ..BakeOptions::default()
             });
-            bake(&outbox, Arc::clone(&document.model), 1, wanted, None, cancel);
+            bake(&outbox, Arc::clone(&document.grouped), 1, wanted, None, cancel);
             drop(outbox);
             let baked = updates
                 .iter()
@@ -216,7 +229,7 @@ mod tests {
         });
         bake(
             &outbox,
-            Arc::clone(&document.model),
+            Arc::clone(&document.grouped),
             1,
             wanted,
             None,

@@ -55,10 +55,10 @@ impl Clearances {
         if self.search.is_outdated(document) {
             ui.label(weak("Parts have moved since: search again"));
         }
-        if found.pairs.is_empty() {
+        let pairs: Vec<Near> = found.loose(document).copied().collect();
+        if pairs.is_empty() {
             ui.label(weak("No two parts are this near"));
         }
-        let pairs = found.pairs.clone();
         ScrollArea::vertical()
             .id_salt("clearances")
             .auto_shrink([false, true])

@@ -8,22 +8,26 @@ use crate::session::{Intent, Session, obstacle};
 /// Width of the eye's place, points.
 pub const WIDTH: f32 = 24.0;
 
-/// Draws the eye at the right end of a line: crossed out for a hidden part, else only while the pointer is on the `line` or the eye has the focus.
-pub fn show(ui: &mut Ui, session: &Session, line: Rect, over: bool, part: usize, wanted: &mut Vec<Intent>) {
+/// Draws the eye at the right end of a line of `parts`: crossed out where all are hidden, else only while the pointer is on the `line` or the eye has the focus.
+pub fn show(
+    ui: &mut Ui,
+    session: &Session,
+    line: Rect,
+    over: bool,
+    (name, parts): (&str, &[usize]),
+    wanted: &mut Vec<Intent>,
+) {
     let Some(document) = &session.document else { return };
-    let hidden = document.is_hidden(part);
+    let hidden = parts.iter().all(|&part| document.is_hidden(part));
     let size = Vec2::new(WIDTH, line.height());
     let place = Rect::from_min_size(line.right_top() - Vec2::new(WIDTH, 0.0), size);
-    let intent = Intent::Hide(part, !hidden);
-    let why = obstacle(session, &intent);
-    let response = ui.interact(place, Id::unique("eye").with(part), Sense::click());
+    let intents = parts.iter().map(|&part| Intent::Hide(part, !hidden));
+    let why = intents.clone().find_map(|intent| obstacle(session, &intent));
+    let response = ui.interact(place, Id::unique("eye").with(parts), Sense::click());
     let verb = if hidden { "Show" } else { "Hide" };
-    response.widget_info(|| {
-        let name = format!("{verb} {}", document.part_name(part));
-        WidgetInfo::labeled(Role::Button, why.is_none(), name)
-    });
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, why.is_none(), format!("{verb} {name}")));
     if response.clicked() {
-        wanted.push(intent);
+        wanted.extend(intents);
     }
     if hidden || over || response.hovered() || response.has_focus() {
         let ink = theme::of(ui);

@@ -53,7 +53,7 @@ fn partner(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
     let subject = session.fit_subject();
     ui.horizontal(|ui| {
         let label = ui.label(RichText::new("Fits with").color(theme::of(ui).text_weak));
-        let chosen = session.partner.map_or(NEAREST, |part| document.part_name(part));
+        let chosen = session.partner.map_or(NEAREST, |part| document.moving_name(part));
         let list = egui::ComboBox::from_id_salt("fits with")
             .width(ui.available_width() - 8.0)
             .selected_text(chosen)
@@ -63,10 +63,10 @@ fn partner(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
                     wanted.push(Intent::FitWith(None));
                 }
                 for part in 0..document.model.parts.len() {
-                    if Some(part) == subject || !is_closed(&document.model, part) {
+                    if Some(part) == subject || !is_closed(&document.grouped.model, part) {
                         continue;
                     }
-                    let name = document.part_name(part);
+                    let name = document.moving_name(part);
                     if ui.selectable_label(session.partner == Some(part), name).clicked() {
                         wanted.push(Intent::FitWith(Some(part)));
                     }
@@ -80,7 +80,7 @@ fn partner(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
 
 fn find(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let part = match (&session.document, session.fit_subject()) {
-        (Some(document), Some(part)) => document.part_name(part),
+        (Some(document), Some(part)) => document.moving_name(part),
         _ => "the selected part",
     };
     let hint = format!("Search the poses at which {part} fits (M). It moves only when you place it");
@@ -111,7 +111,7 @@ fn searching(ui: &mut Ui, session: &Session, parts: usize, search: &Search, want
 
 /// What was found, and what can be done with it.
 fn list(ui: &mut Ui, session: &Session, document: &Document, fitting: &Fitting, wanted: &mut Vec<Intent>) {
-    let part = document.part_name(fitting.moving);
+    let part = document.moving_name(fitting.moving);
     let heading = match (fitting.offers.len(), &fitting.search) {
         (0, Some(_)) => return,
         (0, None) if fitting.parts > 1 => {
@@ -162,7 +162,7 @@ fn line(
 ) {
     let ink = theme::of(ui);
     let format = |size, color| TextFormat::simple(FontId::proportional(size), color);
-    let title = format!("{}. with {}", number + 1, document.part_name(offer.against));
+    let title = format!("{}. with {}", number + 1, document.moving_name(offer.against));
     let mut job = LayoutJob::default();
     job.append(&title, 0.0, format(13.0, ink.text_strong));
     job.append("\n", 0.0, format(13.0, ink.text));
@@ -245,8 +245,8 @@ pub fn over_view(ui: &mut Ui, rect: Rect, top: f32, session: &Session, view: &mu
         "Fit {} of {}: {} with {}. N: next, T: turn over, G: guide, P: place",
         fitting.chosen + 1,
         fitting.offers.len(),
-        document.part_name(fitting.moving),
-        document.part_name(offer.against)
+        document.moving_name(fitting.moving),
+        document.moving_name(offer.against)
     );
     let drawn = ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
         ui.horizontal(|ui| {

@@ -129,7 +129,7 @@ fn amount(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
     };
     let (ink, mut words) = (theme::of(ui), hold.words(pose));
     if let Some(other) = session.moves.stopped_by() {
-        words += &format!(", stopped by {}", document.part_name(other));
+        words += &format!(", stopped by {}", document.moving_name(other));
     }
     let painter = ui.painter_at(rect);
     let galley = painter.layout_no_wrap(words.clone(), FontId::proportional(14.0), ink.text_strong);

@@ -212,7 +212,7 @@ fn state(ui: &mut Ui, session: &Session, width: f32) {
                 DeviceState::Testing => (ink.good, "Testing"),
             };
             let document = session.document.as_ref();
-            let words = |part, doing: &str| Some(format!("{doing}: {}", document?.part_name(part)));
+            let words = |part, doing: &str| Some(format!("{doing}: {}", document?.moving_name(part)));
             let held = session.grabbed().and_then(|part| words(part, "Holding"));
             let clutched = session.clutched().and_then(|part| words(part, "Clutch open"));
             let named = clutched.or(held);

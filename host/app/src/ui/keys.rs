@@ -39,11 +39,17 @@ pub const KEYS: &[Group] = &[
         &[
             ("Click", "select the part"),
             (
+                "Ctrl+click, Shift+click",
+                "select it too; select all up to there in the list",
+            ),
+            ("Ctrl+G", "group the selected parts"),
+            ("Ctrl+Shift+G", "take the group of the selected part apart"),
+            (
                 "Double click",
                 "grab the part, or frame it while it cannot be grabbed",
             ),
-            ("H", "hide the selected part, and show it again"),
-            ("I", "show the selected part alone"),
+            ("H", "hide the selected parts, and show them again"),
+            ("I", "show the selected parts alone"),
             ("Shift+H", "show all parts"),
             (
                 "C, held",

@@ -35,6 +35,7 @@ mod motion;
 mod nudge;
 mod open;
 mod parameters;
+mod part_line;
 mod parts;
 mod playback;
 pub mod plots;
@@ -58,6 +59,7 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers, Ui};
 
 use self::arrange::{Arrangement, Tab};
+use crate::session::grouping::GroupIntent;
 use crate::session::link::Link;
 use crate::session::workspace::Workspace;
 use crate::session::{Intent, Session};
@@ -359,13 +361,23 @@ fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {
         let Some(document) = session.document.as_ref().filter(|_| !typing) else {
             return;
         };
+        let selection = session.selection();
+        // First, because a key without Shift also fits the one with it.
+        if input.consume_key(Modifiers::COMMAND | Modifiers::SHIFT, Key::G) {
+            let part = session.selected.unwrap_or(usize::MAX);
+            wanted.push(Intent::Group(GroupIntent::Ungroup(part)));
+        }
+        if input.consume_key(Modifiers::COMMAND, Key::G) {
+            wanted.push(Intent::Group(GroupIntent::Group(selection.clone())));
+        }
         // First, because a key without modifiers also fits the one with Shift.
         if input.consume_key(Modifiers::SHIFT, Key::H) {
             wanted.push(Intent::ShowAll);
         }
         if let Some(part) = session.selected {
             if input.consume_key(Modifiers::NONE, Key::H) {
-                wanted.push(Intent::Hide(part, !document.is_hidden(part)));
+                let hides = !document.is_hidden(part);
+                wanted.extend(selection.into_iter().map(|part| Intent::Hide(part, hides)));
             }
             if input.consume_key(Modifiers::NONE, Key::I) {
                 wanted.push(Intent::Isolate(part));

@@ -1,19 +1,24 @@
-//! The list of parts on the left: the assembly as a tree, and a search in it. A click selects a part, a double click grabs it, the eye hides it.
+//! The list of parts on the left: groups, the assembly as a tree, and a search in both. Under it the selected part, and what groups the selected ones.
 
 use std::cell::Cell;
 
 use egui::collapsing_header::CollapsingState;
-use egui::{
-    Align, Color32, CornerRadius, Id, Layout, RichText, Role, ScrollArea, Sense, TextEdit, Ui, Vec2,
-    WidgetInfo,
-};
-use mortise_brep::Surface;
+use egui::{Align, Id, Layout, RichText, ScrollArea, TextEdit, Ui, Vec2};
+use mortise_brep::{Shape, Surface};
 
-use super::{control, eye, motion, theme};
+use super::part_line::{self, Listed};
+use super::{control, motion, theme};
 use crate::session::document::Document;
+use crate::session::grouping::GroupIntent;
+use crate::session::groups::Group;
 use crate::session::tree::{self, Branch};
-use crate::session::{Intent, Session, obstacle};
+use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
+
+/// By how much a name with a button beside it is higher than one without, points.
+const UNGROUP: f32 = 6.0;
+/// Distance of the parts of a group from the left, points.
+const INDENT: f32 = 34.0;
 
 /// Draws the list.
 pub fn show(
@@ -33,20 +38,23 @@ pub fn show(
     };
     field(ui, search);
     let under = Cell::new(None);
+    let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
+    let shown = found.as_ref().unwrap_or(&document.tree);
+    let order: Vec<usize> = shown.iter().flat_map(Branch::parts).collect();
     let listed = Listed {
         session,
         document,
+        order: &order,
         marked: &view.marked.parts,
         over: view.over.before,
         pair: view.pair,
         under: &under,
     };
-    let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
     let details = session.selected.filter(|&p| p < document.model.parts.len());
-    let room = if details.is_some() {
-        188.0 + fields.height(ui)
-    } else {
-        0.0
+    let room = match details {
+        None => 0.0,
+        Some(part) if document.groups().of(part).is_some() => 188.0 + UNGROUP + fields.height(ui),
+        Some(_) => 188.0 + fields.height(ui),
     };
     ScrollArea::vertical()
         .id_salt("tree")
@@ -119,32 +127,27 @@ fn field(ui: &mut Ui, search: &mut String) {
     ui.add_space(4.0);
 }
 
-/// What lines are drawn of.
-#[derive(Clone, Copy)]
-struct Listed<'a> {
-    session: &'a Session,
-    document: &'a Document,
-    /// Parts that are pointed out.
-    marked: &'a [usize],
-    /// The part under the pointer in the frame before.
-    over: Option<usize>,
-    /// The parts of the connection under the pointer.
-    pair: Option<[usize; 2]>,
-    /// The part whose line is under the pointer.
-    under: &'a Cell<Option<usize>>,
-}
-
 fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches: &[Branch], id: Id) {
     for (index, branch) in branches.iter().enumerate() {
         match branch {
-            Branch::Part(part) => line(ui, listed, wanted, *part),
+            Branch::Part(part) => {
+                let name = listed.document.part_name(*part);
+                part_line::show(ui, listed, wanted, name, &[*part]);
+            }
+            Branch::Group { name, parts } => {
+                let id = id.with(("group", parts));
+                let first = listed.document.groups().first(parts[0]);
+                // A search shows some of the parts; the line is of all.
+                let all = listed.document.groups().together(first);
+                CollapsingState::load_with_default_open(ui.ctx(), id, true)
+                    .show_header(ui, |ui| part_line::show(ui, listed, wanted, name, &all))
+                    .body_unindented(|ui| members(ui, listed, wanted, parts));
+            }
             Branch::Assembly { name, children } => {
                 let id = id.with((index, name));
                 CollapsingState::load_with_default_open(ui.ctx(), id, true)
                     .show_header(ui, |ui| {
-                        ui.add(
-                            egui::Label::new(RichText::new(name).color(theme::of(ui).text_weak)).truncate(),
-                        );
+                        part_line::assembly(ui, listed, wanted, name, &branch.parts());
                     })
                     .body(|ui| self::branches(ui, listed, wanted, children, id));
             }
@@ -152,127 +155,117 @@ fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches:
     }
 }
 
-fn line(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, part: usize) {
-    let Listed {
-        session,
-        document,
-        marked,
-        over,
-        pair,
-        under,
-    } = listed;
-    let pointed = over == Some(part) || pair.is_some_and(|pair| pair.contains(&part));
-    let (name, color) = (document.part_name(part), document.colors[part]);
-    let (selected, held) = (session.selected == Some(part), session.grabbed() == Some(part));
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 28.0), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, selected, name));
-    let painter = ui.painter_at(rect);
-    if response.hovered() {
-        under.set(Some(part));
-    }
-    let fill = match (held, selected, response.hovered() || pointed) {
-        (true, ..) => theme::of(ui).held.gamma_multiply(0.22),
-        (_, true, _) => theme::of(ui).accent_dim.gamma_multiply(0.8),
-        _ if marked.contains(&part) => theme::of(ui).accent_dim.gamma_multiply(0.5),
-        (_, _, true) => theme::of(ui).card,
-        _ => Color32::TRANSPARENT,
-    };
-    painter.rect_filled(rect, CornerRadius::same(6), fill);
-    let swatch = egui::Rect::from_center_size(rect.left_center() + Vec2::new(15.0, 0.0), Vec2::splat(12.0));
-    let [r, g, b] = color;
-    painter.rect_filled(swatch, CornerRadius::same(3), Color32::from_rgb(r, g, b));
-    let note = if held {
-        Some(("held", theme::of(ui).held))
-    } else if document.baked.is_some() && !document.is_grabbable(part) {
-        Some(("fixed", theme::of(ui).text_weak))
-    } else {
-        None
-    };
-    let mut right = rect.right() - eye::WIDTH;
-    if let Some((note, color)) = note {
-        let drawn = painter.text(
-            egui::Pos2::new(right, rect.center().y),
-            egui::Align2::RIGHT_CENTER,
-            note,
-            egui::FontId::proportional(11.5),
-            color,
-        );
-        right = drawn.left() - 8.0;
-    }
-    let ink = match document.is_hidden(part) {
-        true => theme::of(ui).text_weak,
-        false => theme::of(ui).text_strong,
-    };
-    let mut job = egui::text::LayoutJob::single_section(
-        name.to_owned(),
-        egui::TextFormat::simple(egui::FontId::proportional(13.5), ink),
-    );
-    job.wrap = egui::text::TextWrapping::truncate_at_width((right - swatch.right() - 8.0).max(10.0));
-    let galley = painter.layout_job(job);
-    let at = egui::Pos2::new(swatch.right() + 8.0, rect.center().y - 0.5 * galley.size().y);
-    painter.galley(at, galley, ink);
-    eye::show(ui, session, rect, response.hovered(), part, wanted);
-    if response.clicked() {
-        wanted.push(Intent::Select(Some(part)));
-    }
-    if response.double_clicked() {
-        wanted.push(Intent::Grab(part));
-    }
-    response.on_hover_ui(|ui| {
-        ui.label(name);
-        let hint = obstacle(session, &Intent::Grab(part)).unwrap_or_else(|| "Double click to grab".into());
-        ui.label(RichText::new(hint).small().color(theme::of(ui).text_weak));
+/// The lines of the parts of a group.
+fn members(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, parts: &[usize]) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 0.0;
+        ui.add_space(INDENT);
+        ui.vertical(|ui| {
+            for &part in parts {
+                let name = listed.document.part_name(part);
+                part_line::show(ui, listed, wanted, name, &[part]);
+            }
+        });
     });
 }
 
+/// What details are shown of: the selected part, its group where all of that is selected, or several parts.
+enum Subject<'a> {
+    Part,
+    Group(&'a Group),
+    Several(Vec<usize>),
+}
+
+impl<'a> Subject<'a> {
+    fn of(session: &Session, document: &'a Document, part: usize) -> Self {
+        let selection = session.selection();
+        match document.groups().of(part) {
+            Some(group) if selection == group.parts() => Self::Group(group),
+            _ if selection.len() > 1 => Self::Several(selection),
+            _ => Self::Part,
+        }
+    }
+}
+
 fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
-    let Some(shape) = document.model.shapes.get(document.model.parts[part].shape) else {
-        return;
+    let subject = Subject::of(session, document, part);
+    let (name, parts) = match &subject {
+        Subject::Part => (document.part_name(part).to_owned(), vec![part]),
+        Subject::Group(group) => (group.name.clone(), group.parts().to_vec()),
+        Subject::Several(parts) => (format!("{} parts selected", parts.len()), parts.clone()),
     };
     ui.spacing_mut().item_spacing.y = 3.0;
-    let name = RichText::new(document.part_name(part)).color(theme::of(ui).text_strong);
-    ui.add(egui::Label::new(name).truncate());
-    control::row(ui, "Faces", shape.faces.len().to_string());
-    let exact = shape
-        .faces
-        .iter()
-        .filter(|f| !matches!(f.surface, Surface::Spline))
-        .count();
-    control::row(ui, "in closed form", exact.to_string());
-    control::row(ui, "Volume", format!("{} mm³", grouped(shape.volume_mm3)));
-    let closed = if shape.closed {
-        "closed".to_owned()
-    } else {
-        format!("{} open edges", shape.open_edges)
+    heading_of(ui, session, document, wanted, &name, part);
+    let model = &document.model;
+    let shapes: Vec<&Shape> = (parts.iter())
+        .filter_map(|&part| model.shapes.get(model.parts.get(part)?.shape))
+        .collect();
+    let faces = || shapes.iter().flat_map(|shape| &shape.faces);
+    let exact = faces().filter(|face| !matches!(face.surface, Surface::Spline));
+    let volume: f64 = shapes.iter().map(|shape| shape.volume_mm3).sum();
+    control::row(ui, "Faces", faces().count().to_string());
+    control::row(ui, "in closed form", exact.count().to_string());
+    control::row(ui, "Volume", format!("{} mm³", grouped(volume)));
+    let open: usize = shapes.iter().map(|shape| shape.open_edges).sum();
+    let closed = match shapes.iter().all(|shape| shape.closed) {
+        true => "closed".to_owned(),
+        false => format!("{open} open edges"),
     };
     control::row(ui, "Shell", closed);
     ui.add_space(4.0);
-    ui.vertical_centered_justified(|ui| grab(ui, session, wanted, part));
+    ui.vertical_centered_justified(|ui| match subject {
+        Subject::Several(parts) => group(ui, session, wanted, parts),
+        Subject::Part | Subject::Group(_) => grab(ui, session, document, wanted, part),
+    });
 }
 
-fn grab(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, part: usize) {
-    let wide = Vec2::new(0.0, 30.0);
-    if session.grabbed() == Some(part) {
-        let button = egui::Button::new("Release").min_size(wide);
-        control::intent_button(
-            ui,
-            session,
-            wanted,
-            button,
-            Intent::Release,
-            "The part stays where it is",
-        );
-    } else {
-        let button = control::primary(ui, "Grab").min_size(wide);
-        control::intent_button(
-            ui,
-            session,
-            wanted,
-            button,
-            Intent::Grab(part),
-            "Couple the handle to this part at their present positions",
-        );
+/// The name of what is shown, and what takes the group of the part apart.
+fn heading_of(
+    ui: &mut Ui,
+    session: &Session,
+    document: &Document,
+    wanted: &mut Vec<Intent>,
+    name: &str,
+    part: usize,
+) {
+    let label = egui::Label::new(RichText::new(name).color(theme::of(ui).text_strong)).truncate();
+    if document.groups().of(part).is_none() {
+        ui.add(label);
+        return;
     }
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let button = egui::Button::new(RichText::new("Ungroup").size(12.5));
+            let intent = Intent::Group(GroupIntent::Ungroup(part));
+            let group = document.moving_name(part);
+            let hint = format!("Let every part of {group} move by itself (Ctrl+Shift+G)");
+            control::intent_button(ui, session, wanted, button, intent, &hint);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| ui.add(label));
+        });
+    });
+}
+
+fn group(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, parts: Vec<usize>) {
+    let button = control::primary(ui, "Group").min_size(Vec2::new(0.0, 30.0));
+    let intent = Intent::Group(GroupIntent::Group(parts));
+    let hint = "Grab and move them as one, as they are to one another (Ctrl+G)";
+    control::intent_button(ui, session, wanted, button, intent, hint);
+}
+
+fn grab(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
+    let wide = Vec2::new(0.0, 30.0);
+    if session.is_held(part) {
+        let button = egui::Button::new("Release").min_size(wide);
+        let hint = "The part stays where it is";
+        control::intent_button(ui, session, wanted, button, Intent::Release, hint);
+        return;
+    }
+    let button = control::primary(ui, "Grab").min_size(wide);
+    let hint = match document.groups().of(part) {
+        None => "Couple the handle to this part at their present positions".to_owned(),
+        Some(group) => format!("Couple the handle to {} as one", group.name),
+    };
+    control::intent_button(ui, session, wanted, button, Intent::Grab(part), &hint);
 }
 
 /// A number with its digits in groups of three.

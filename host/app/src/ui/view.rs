@@ -363,7 +363,7 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         return;
     };
     let sample = session.history.newest();
-    let mut lines = vec![(document.part_name(part).to_owned(), theme::of(ui).held, 14.5)];
+    let mut lines = vec![(document.moving_name(part).to_owned(), theme::of(ui).held, 14.5)];
     if let Some(sample) = sample {
         lines.push((
             format!("{:.2} N on the handle", sample.handle_n),
@@ -382,7 +382,10 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         let own = Touch::of(document, part, [pair.moving_face, pair.moving_edge_face], at);
         let touched = document.model_part(pair.static_part).map(|other| {
             let touch = Touch::of(document, other, [pair.static_face, pair.static_edge_face], at);
-            format!("{touch} of {}", document.part_name(other))
+            format!(
+                "{touch} of {}",
+                document.owner_name(other, &[pair.static_face.into()])
+            )
         });
         let touched = touched.as_deref().unwrap_or("?");
         let text = format!("{own} on {touched}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));

@@ -92,11 +92,10 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
     let focus = session.joints.in_focus(document);
     let focus = focus.or(look.pair.map(Vec::from));
     let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
-        .filter(|&(index, _)| !document.is_hidden(index) || held == Some(index))
+        .filter(|&(index, _)| !document.is_hidden(index) || session.is_held(index))
         .map(|(index, part)| {
-            let in_hand = held == Some(index);
-            let marked =
-                session.selected == Some(index) || look.is_over(index) || look.marked.contains(&index);
+            let in_hand = session.is_held(index);
+            let marked = session.is_selected(index) || look.is_over(index) || look.marked.contains(&index);
             let aside = focus.as_ref().is_some_and(|focus| !focus.contains(&index));
             let glass = aside || look.see_through && !in_hand && is_fixed(document, index);
             Item {
@@ -105,7 +104,7 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
                     .map_or(document.poses[index], |by| by * document.poses[index]),
                 color: document.colors[index].map(|c| f32::from(c) / 255.0),
                 opacity: if glass { SEEN_THROUGH } else { 1.0 },
-                tint: tint(index, held, look),
+                tint: tint(index, in_hand, look),
                 line: match (in_hand, marked) {
                     (true, _) => held_line,
                     (_, true) => marked_line,
@@ -118,13 +117,15 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
             }
         })
         .collect();
+    let commanded = session.ghost();
+    let commanded = commanded.map_or_else(Vec::new, |(part, pose)| with_group(document, part, pose));
     items.extend(
-        session
-            .ghost()
-            .and_then(|(part, pose)| ghost(document, part, pose)),
+        commanded
+            .into_iter()
+            .filter_map(|(part, pose)| ghost(document, part, pose)),
     );
     match fit {
-        Some((part, offer)) => items.extend(fit_ghost(document, part, offer)),
+        Some((part, offer)) => items.extend(fit_ghosts(document, part, offer)),
         None => {
             let next = session.next_places();
             items.extend(
@@ -136,7 +137,7 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
     let cut = look.cut.map(|shown| Cutaway {
         plane: shown.plane,
         areas: shown.cut.map(|cut| Areas(cut.clone())),
-        fills: fills(document, shown, held, look),
+        fills: fills(session, document, shown, look),
     });
     Picture {
         camera: look.camera,
@@ -150,8 +151,8 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
 }
 
 /// Colour mixed into a part, and its weight.
-fn tint(part: usize, held: Option<usize>, look: &Look<'_>) -> [f32; 4] {
-    if held == Some(part) {
+fn tint(part: usize, in_hand: bool, look: &Look<'_>) -> [f32; 4] {
+    if in_hand {
         TINT_HELD
     } else if look.marked.contains(&part) {
         TINT_MARKED
@@ -163,16 +164,16 @@ fn tint(part: usize, held: Option<usize>, look: &Look<'_>) -> [f32; 4] {
 }
 
 /// The areas of a section, each in its part's colour and hatched in a direction of its own.
-fn fills(document: &Document, shown: Shown<'_>, held: Option<usize>, look: &Look<'_>) -> Vec<Fill> {
+fn fills(session: &Session, document: &Document, shown: Shown<'_>, look: &Look<'_>) -> Vec<Fill> {
     let areas = shown.cut.map_or(&[][..], |cut| cut.areas.as_slice());
     (areas.iter().enumerate())
-        .filter(|(_, area)| !document.is_hidden(area.part) || held == Some(area.part))
+        .filter(|(_, area)| !document.is_hidden(area.part) || session.is_held(area.part))
         .filter_map(|(index, area)| {
             let color = document.colors.get(area.part)?;
             Some(Fill {
                 area: index,
                 color: color.map(|c| f32::from(c) / 255.0),
-                tint: tint(area.part, held, look),
+                tint: tint(area.part, session.is_held(area.part), look),
                 line: EDGE,
                 hatch: HATCHES[area.part % HATCHES.len()].to_radians(),
             })
@@ -186,17 +187,23 @@ fn is_fixed(document: &Document, part: usize) -> bool {
 
 /// Faces of a part that touch, deepest first.
 fn lit(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -> Vec<u32> {
+    let first = document.groups().first(part);
     let mut faces: Vec<u32> = Vec::new();
     for pair in &telemetry.pairs {
         let face = if in_hand {
             pair.moving_face
-        } else if document.model_part(pair.static_part) == Some(part) {
+        } else if document.model_part(pair.static_part) == Some(first) {
             pair.static_face
         } else {
             continue;
         };
-        if face != NO_FACE && faces.len() < MAX_LIT && !faces.contains(&u32::from(face)) {
-            faces.push(face.into());
+        let own = (face != NO_FACE).then(|| document.grouped.owner(first, face.into()));
+        if let Some((owner, face)) = own.flatten()
+            && owner == part
+            && faces.len() < MAX_LIT
+            && !faces.contains(&face)
+        {
+            faces.push(face);
         }
     }
     faces
@@ -204,21 +211,38 @@ fn lit(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -
 
 /// Edges of a part that touch, deepest first.
 fn lit_edges(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -> Vec<[u32; 2]> {
+    let first = document.groups().first(part);
     let mut edges: Vec<[u32; 2]> = Vec::new();
     for pair in &telemetry.pairs {
         let faces = if in_hand {
             [pair.moving_face, pair.moving_edge_face]
-        } else if document.model_part(pair.static_part) == Some(part) {
+        } else if document.model_part(pair.static_part) == Some(first) {
             [pair.static_face, pair.static_edge_face]
         } else {
             continue;
         };
-        let edge = meeting(&faces.map(u32::from));
-        if !faces.contains(&NO_FACE) && edges.len() < MAX_LIT_EDGES && !edges.contains(&edge) {
-            edges.push(edge);
+        if faces.contains(&NO_FACE) {
+            continue;
+        }
+        let own = faces.map(|face| document.grouped.owner(first, face.into()));
+        if let [Some((a, one)), Some((b, other))] = own
+            && [a, b] == [part; 2]
+        {
+            let edge = meeting(&[one, other]);
+            if edges.len() < MAX_LIT_EDGES && !edges.contains(&edge) {
+                edges.push(edge);
+            }
         }
     }
     edges
+}
+
+/// A part at a pose, and with it those of its group.
+fn with_group(document: &Document, part: usize, pose: DAffine3) -> Vec<(usize, DAffine3)> {
+    match document.groups().of(part) {
+        Some(group) if group.first() == part => group.placed(pose).collect(),
+        _ => vec![(part, pose)],
+    }
 }
 
 /// The ghost of a part elsewhere; `None` where the part is there.
@@ -240,14 +264,16 @@ fn ghost(document: &Document, part: usize, pose: DAffine3) -> Option<Item> {
     })
 }
 
-/// The ghost of a part in a fit, its mating faces marked; `None` where the part is there.
-fn fit_ghost(document: &Document, part: usize, offer: &Offer) -> Option<Item> {
-    let (pose, here) = (offer.pose(document)?, document.poses.get(part)?);
+/// The ghosts of a part and of its group in a fit, their mating faces marked; none where the part is there.
+fn fit_ghosts(document: &Document, part: usize, offer: &Offer) -> Vec<Item> {
+    let (Some(pose), Some(here)) = (offer.pose(document), document.poses.get(part)) else {
+        return Vec::new();
+    };
     if apart(&pose, here, document, part) <= GHOST_FROM * document.extent.radius {
-        return None;
+        return Vec::new();
     }
-    Some(Item {
-        shape: document.model.parts[part].shape,
+    let ghost = |(own, pose): (usize, DAffine3)| Item {
+        shape: document.model.parts[own].shape,
         pose,
         color: GHOST_FIT,
         opacity: 0.34,
@@ -255,40 +281,51 @@ fn fit_ghost(document: &Document, part: usize, offer: &Offer) -> Option<Item> {
         line: [GHOST_FIT[0], GHOST_FIT[1], GHOST_FIT[2], 0.9],
         lit: Vec::new(),
         lit_edges: Vec::new(),
-        mates: of_fit(offer, 0),
-    })
+        mates: of_fit(document, offer, 0, own),
+    };
+    let parts = with_group(document, part, pose);
+    parts.into_iter().map(ghost).collect()
 }
 
-/// Mating faces of a fit: of the moving part, or of the other.
-fn of_fit(offer: &Offer, side: usize) -> Vec<u32> {
-    let mut faces: Vec<u32> = offer.fit.faces.iter().map(|pair| pair[side]).collect();
+/// Mating faces of a fit on one side, the moving part's or the other's, that `part` has.
+fn of_fit(document: &Document, offer: &Offer, side: usize, part: usize) -> Vec<u32> {
+    let faces = offer.fit.faces.iter().map(|pair| pair[side]);
+    let mut faces = own_faces(document, part, faces);
     faces.sort_unstable();
     faces.dedup();
     faces.truncate(MAX_LIT);
     faces
 }
 
+/// Of faces of the part that stands for this one, those that this one has, with their numbers there.
+fn own_faces(document: &Document, part: usize, faces: impl Iterator<Item = u32>) -> Vec<u32> {
+    let first = document.groups().first(part);
+    let own = faces.filter_map(|face| document.grouped.owner(first, face));
+    own.filter(|(owner, _)| *owner == part)
+        .map(|(_, face)| face)
+        .collect()
+}
+
 /// Faces of a part that fit another part's: those of the joint that is marked, of the fit that is shown, and those that are held there, guided or by contact.
 fn mates(session: &Session, document: &Document, part: usize, fit: Option<(usize, &Offer)>) -> Vec<u32> {
     let held = session.grabbed();
+    let first = document.groups().first(part);
     let list = (held.is_some() && session.guidance.held == held).then_some(&session.guidance);
     let mut faces = match fit {
-        Some((_, offer)) if offer.against == part => of_fit(offer, 1),
+        Some((_, offer)) if offer.against == first => of_fit(document, offer, 1, part),
         _ => Vec::new(),
     };
     faces.extend(session.joints.marked_faces(document, part));
     for row in list.into_iter().flat_map(|list| &list.rows) {
         let target = &row.target;
         let own = match &row.standing {
-            Standing::Sent | Standing::ByContact if part == target.id.moving_part => &target.moving_faces,
-            Standing::Sent | Standing::ByContact if part == target.id.fixed_part => &target.fixed_faces,
+            Standing::Sent | Standing::ByContact if first == target.id.moving_part => &target.moving_faces,
+            Standing::Sent | Standing::ByContact if first == target.id.fixed_part => &target.fixed_faces,
             _ => continue,
         };
-        faces.extend(
-            own.iter()
-                .filter(|face| !faces.contains(face))
-                .collect::<Vec<_>>(),
-        );
+        let own = own_faces(document, part, own.iter().copied());
+        let others: Vec<u32> = own.into_iter().filter(|face| !faces.contains(face)).collect();
+        faces.extend(others);
     }
     faces.truncate(MAX_LIT);
     faces
@@ -326,11 +363,8 @@ fn arrows(document: &Document, telemetry: &Telemetry) -> Vec<Arrow> {
 
 /// Largest distance between the points of a part's bounding sphere at two poses, mm.
 fn apart(a: &DAffine3, b: &DAffine3, document: &Document, part: usize) -> f64 {
-    let Extent { center, radius } = document
-        .extents
-        .get(document.model.parts[part].shape)
-        .copied()
-        .unwrap_or_default();
+    let shape = document.model.parts[part].shape;
+    let Extent { center, radius } = document.extents.get(shape).copied().unwrap_or_default();
     let centers = (a.transform_point3(center) - b.transform_point3(center)).length();
     let turned: f64 = (0..3)
         .map(|i| (a.matrix3.col(i) - b.matrix3.col(i)).length_squared())

@@ -162,7 +162,12 @@ impl Viewpoint {
         } else if response.clicked() && !on_handle {
             let hit = self.pick(document, rect, response.interact_pointer_pos());
             (self.picked, self.marked) = (hit, Marked::default());
-            wanted.push(Intent::Select(hit.map(|h| h.part)));
+            let adds = ui.input(|i| i.modifiers.ctrl || i.modifiers.command);
+            match hit {
+                Some(hit) if adds => wanted.push(Intent::SelectAlso(vec![hit.part])),
+                None if adds => {}
+                hit => wanted.push(Intent::Select(hit.map(|hit| hit.part))),
+            }
         }
         if response.double_clicked()
             && !self.measure.on
@@ -225,13 +230,13 @@ impl Viewpoint {
         let under = document.and_then(|document| self.pick(document, response.rect, pressed));
         self.drag = Some(Drag::Orbit(under.map_or(self.camera.target, |hit| hit.point)));
         let simulated = session.connection().is_some_and(|c| c.capabilities.simulated);
-        let (Some(held), Some(handle)) = (session.grabbed(), session.handle()) else {
+        let (Some(_), Some(handle)) = (session.grabbed(), session.handle()) else {
             return;
         };
         if left
             && simulated
             && let Some(hit) = under
-            && hit.part == held
+            && session.is_held(hit.part)
         {
             self.drag = Some(Drag::Hand {
                 anchor: hit.point,

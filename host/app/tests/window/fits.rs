@@ -1,10 +1,13 @@
 //! Fits found in the window: shown before anything moves, looked through by keys, and accepted while the motors are off.
 
+use std::sync::Arc;
+
 use crate::common::{arm, click, connect, harness, holding, open_sample, picture, poses, press, until};
 use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::{DAffine3, DVec3};
+use mortise::session::grouped::Grouped;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
 use mortise::viewport::picture::Item;
@@ -196,6 +199,19 @@ fn click_sample_again(harness: &mut Harness<'_, Window>) {
     });
 }
 
+/// Whether the block and the peg have closed shells.
+fn close(session: &mut Session, closed: [bool; 2]) {
+    let document = session.document.as_mut().expect("open");
+    let model = Arc::make_mut(&mut document.model);
+    for (shape, closed) in model.shapes.iter_mut().zip(closed) {
+        shape.closed = closed;
+    }
+    document.grouped = Arc::new(Grouped::none(
+        Arc::clone(&document.model),
+        document.extents.clone(),
+    ));
+}
+
 #[test]
 fn what_cannot_be_searched_is_said() {
     let mut harness = harness();
@@ -209,16 +225,13 @@ fn what_cannot_be_searched_is_said() {
     assert!(why(session).contains("does not fit itself"));
     session.act(Intent::FitWith(Some(0)));
     assert_eq!(why(session), "");
-    let document = session.document.as_mut().expect("open");
-    std::sync::Arc::make_mut(&mut document.model).shapes[1].closed = false;
+    close(session, [true, false]);
     assert!(why(session).contains("peg has no closed surface"));
     for intent in [Intent::NextFit, Intent::TurnOver, Intent::PlaceFit] {
         assert!(obstacle(session, &intent).is_some_and(|why| why.contains("find fits first")));
     }
     // The other part has an open shell.
-    let document = session.document.as_mut().expect("open");
-    let shapes = &mut std::sync::Arc::make_mut(&mut document.model).shapes;
-    (shapes[0].closed, shapes[1].closed) = (false, true);
+    close(session, [false, true]);
     session.act(Intent::FindFits);
     until(&mut harness, "said", |s| {
         s.fitting.as_ref().is_some_and(|fitting| fitting.search.is_none())

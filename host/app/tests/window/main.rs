@@ -13,6 +13,8 @@ mod fits;
 mod flow;
 mod fonts;
 mod getting_started;
+mod grouping;
+mod groups;
 mod guidance;
 mod joints;
 mod kept;

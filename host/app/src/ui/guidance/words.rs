@@ -12,8 +12,8 @@ use crate::session::document::Document;
 /// Kind and parts.
 pub fn title(document: &Document, target: &Target) -> String {
     let (moving, fixed) = (
-        document.part_name(target.id.moving_part),
-        document.part_name(target.id.fixed_part),
+        document.owner_name(target.id.moving_part, &target.moving_faces),
+        document.owner_name(target.id.fixed_part, &target.fixed_faces),
     );
     let kind = target.kind.name();
     let between = match target.kind {
@@ -116,7 +116,8 @@ pub fn standing(document: &Document, list: &List, row: &Row, guides: bool) -> St
 
 /// Face numbers of both parts.
 pub fn faces(document: &Document, target: &Target) -> String {
-    let numbers = |faces: &[u32]| {
+    let numbers = |part: usize, faces: &[u32]| {
+        let (_, faces) = document.owner(part, faces);
         let shown: Vec<String> = faces.iter().take(6).map(u32::to_string).collect();
         let more = faces.len().saturating_sub(shown.len());
         let word = if faces.len() == 1 { "face" } else { "faces" };
@@ -129,10 +130,10 @@ pub fn faces(document: &Document, target: &Target) -> String {
     };
     format!(
         "{}: {}\n{}: {}",
-        document.part_name(target.id.moving_part),
-        numbers(&target.moving_faces),
-        document.part_name(target.id.fixed_part),
-        numbers(&target.fixed_faces),
+        document.owner_name(target.id.moving_part, &target.moving_faces),
+        numbers(target.id.moving_part, &target.moving_faces),
+        document.owner_name(target.id.fixed_part, &target.fixed_faces),
+        numbers(target.id.fixed_part, &target.fixed_faces),
     )
 }
 
