@@ -27,6 +27,9 @@ pub struct Project {
     /// Groups of parts that move as one.
     #[serde(default)]
     pub groups: Vec<KeptGroup>,
+    /// Parts that are locked to the ground; `None`: the largest.
+    #[serde(default)]
+    pub locked: Option<Vec<PartName>>,
     /// Choices of fits.
     #[serde(default)]
     pub fits: Vec<KeptFit>,
@@ -266,6 +269,7 @@ mod tests {
                 name: "peg, cover".into(),
                 parts: vec![name("peg", 1), name("cover", 0)],
             }],
+            locked: Some(vec![name("cover", 0)]),
             fits: vec![KeptFit {
                 moving: name("peg", 1),
                 moving_surface: 3,
@@ -326,14 +330,17 @@ mod tests {
     }
 
     #[test]
-    fn a_file_from_before_there_were_groups_has_none() {
+    fn a_file_from_before_there_were_groups_and_locked_parts_has_none() {
         let mut value = serde_json::to_value(some()).expect("JSON");
-        value.as_object_mut().expect("an object").remove("groups");
+        for added in ["groups", "locked"] {
+            value.as_object_mut().expect("an object").remove(added);
+        }
         let read = Project::from_json(value.to_string().as_bytes()).expect("readable");
         assert_eq!(
             read,
             Project {
                 groups: Vec::new(),
+                locked: None,
                 ..some()
             }
         );
@@ -483,16 +490,18 @@ mod tests {
         let parts = prop::collection::vec(parts(), 0..5);
         let fits = prop::collection::vec(fits(), 0..4);
         let groups = prop::collection::vec(groups(), 0..3);
-        let chosen = (groups, fits);
+        let locked = prop::option::of(prop::collection::vec(names(), 0..3));
+        let chosen = (groups, locked, fits);
         let rig = prop::option::of(".{0,12}");
         let signals = prop::option::of(prop::collection::vec(".{0,8}", 0..4));
         let view = prop::option::of(views());
         (model, parts, chosen, settings(), rig, signals, view).prop_map(
-            |(model, parts, (groups, fits), settings, rig, signals, view)| Project {
+            |(model, parts, (groups, locked, fits), settings, rig, signals, view)| Project {
                 version: VERSION,
                 model,
                 parts,
                 groups,
+                locked,
                 fits,
                 settings,
                 rig,

@@ -4,11 +4,12 @@
 //! number stands for the same part in the document, in the scene of a board, in targets and in fits; faces of a group alone have numbers of their own
 //! ([`Grouped::owner`]).
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::DAffine3;
 use mortise_bake::Grabbable;
-use mortise_brep::{CadModel, Shape};
+use mortise_brep::{CadModel, Part, Shape};
 use mortise_task::joined::joined;
 
 use super::groups::Groups;
@@ -19,6 +20,8 @@ use crate::display::extent::Extent;
 pub struct Grouped {
     /// The groups.
     pub groups: Groups,
+    /// Parts of the file that are locked to the ground, each with its group: they are fixed where they are, and cannot be grabbed. `None`: the largest is.
+    pub locked: Option<BTreeSet<usize>>,
     /// The model with them; the file's where there is none.
     pub model: Arc<CadModel>,
     /// A bounding sphere of each of its shapes, in the shape's frame.
@@ -32,14 +35,28 @@ impl Grouped {
     pub fn none(file: Arc<CadModel>, extents: Vec<Extent>) -> Self {
         Self {
             groups: Groups::default(),
+            locked: None,
             model: Arc::clone(&file),
             extents,
             file,
         }
     }
 
+    /// The same file and groups with other parts locked to the ground.
+    pub fn with_locked(&self, locked: Option<BTreeSet<usize>>) -> Self {
+        Self {
+            locked,
+            ..self.clone()
+        }
+    }
+
     /// The same file with other groups. Cost: a copy of the model's geometry, where there is a group.
     pub fn regrouped(&self, groups: Groups) -> Self {
+        let regrouped = self.of_groups(groups);
+        regrouped.with_locked(self.locked.clone())
+    }
+
+    fn of_groups(&self, groups: Groups) -> Self {
         let mut extents = self.extents.clone();
         extents.truncate(self.file.shapes.len());
         if groups.is_empty() {
@@ -65,23 +82,27 @@ impl Grouped {
         extents.extend(added.map(|shape| Extent::of_points(shape.mesh.vertices.iter().copied())));
         Self {
             groups,
+            locked: None,
             model: Arc::new(model),
             extents,
             file: Arc::clone(&self.file),
         }
     }
 
-    /// The model without the parts that another one stands for, and the number of each of its parts here.
+    /// The model without the parts that another one stands for, and the number of each of its parts here. Where parts are locked, each name is that of one part.
     pub fn bodies(&self) -> (Arc<CadModel>, Vec<usize>) {
         let stands = |&part: &usize| self.groups.first(part) == part;
         let numbers: Vec<usize> = (0..self.model.parts.len()).filter(stands).collect();
-        if self.groups.is_empty() {
+        if self.groups.is_empty() && self.locked.is_none() {
             return (Arc::clone(&self.model), numbers);
         }
         let mut model = CadModel::clone(&self.model);
         model.parts = (numbers.iter())
             .map(|&part| self.model.parts[part].clone())
             .collect();
+        if self.locked.is_some() {
+            name_apart(&mut model.parts);
+        }
         (Arc::new(model), numbers)
     }
 
@@ -103,17 +124,53 @@ impl Grouped {
         None
     }
 
-    /// The parts that may be grabbed: all where a group is the largest one, which would be fixed otherwise.
+    /// The parts that may be grabbed, of [`Self::bodies`]: those that are not locked to the ground; where none was chosen, all but the largest, or all where that is a
+    /// group.
     pub fn grabbable(&self) -> Grabbable {
+        if self.locked.is_some() {
+            let (model, numbers) = self.bodies();
+            let free = numbers
+                .iter()
+                .zip(&model.parts)
+                .filter(|(part, _)| !self.is_locked(**part));
+            return Grabbable::Named(free.map(|(_, part)| part.name.clone()).collect());
+        }
+        match self.largest().and_then(|part| self.groups.of(part)) {
+            Some(_) => Grabbable::All,
+            None => Grabbable::AllButLargest,
+        }
+    }
+
+    /// Whether a part, or one of its group, is locked to the ground.
+    pub fn is_locked(&self, part: usize) -> bool {
+        let together = self.groups.together(part);
+        match &self.locked {
+            Some(locked) => together.iter().any(|part| locked.contains(part)),
+            None => self.groups.of(part).is_none() && self.largest() == Some(part),
+        }
+    }
+
+    /// The parts locked to the ground once this one is, or is free.
+    pub fn locking(&self, part: usize, locks: bool) -> BTreeSet<usize> {
+        let all = 0..self.file.parts.len();
+        let mut locked: BTreeSet<usize> = all.filter(|part| self.is_locked(*part)).collect();
+        for part in self.groups.together(part) {
+            match locks {
+                true => locked.insert(part),
+                false => locked.remove(&part),
+            };
+        }
+        locked
+    }
+
+    /// The part with the largest volume, as it is baked: the first of several.
+    fn largest(&self) -> Option<usize> {
         let volume = |part: &usize| {
             let shape = self.model.shapes.get(self.model.parts[*part].shape);
             shape.map_or(0.0, |shape| shape.volume_mm3.abs())
         };
-        let largest = (0..self.model.parts.len()).max_by(|a, b| volume(a).total_cmp(&volume(b)));
-        match largest.and_then(|part| self.groups.of(part)) {
-            Some(_) => Grabbable::All,
-            None => Grabbable::AllButLargest,
-        }
+        let parts = (0..self.model.parts.len()).rev();
+        parts.max_by(|a, b| volume(a).total_cmp(&volume(b)))
     }
 
     /// Poses of the parts where the file has them, those of a group with its first part.
@@ -121,6 +178,24 @@ impl Grouped {
         let mut poses: Vec<DAffine3> = self.file.parts.iter().map(|part| part.placement).collect();
         self.groups.gather(&mut poses);
         poses
+    }
+}
+
+/// Gives parts of the same name different ones.
+fn name_apart(parts: &mut [Part]) {
+    let mut taken: BTreeSet<String> = parts.iter().map(|part| part.name.clone()).collect();
+    for index in 1..parts.len() {
+        let (before, rest) = parts.split_at_mut(index);
+        let part = &mut rest[0];
+        if before.iter().all(|other| other.name != part.name) {
+            continue;
+        }
+        let numbered = (2..).map(|number| format!("{} ({number})", part.name));
+        let mut free = numbered.filter(|name| !taken.contains(name));
+        if let Some(name) = free.next() {
+            taken.insert(name.clone());
+            part.name = name;
+        }
     }
 }
 

@@ -82,6 +82,8 @@ pub enum Intent {
     ShowAll,
     /// Grab a part.
     Grab(usize),
+    /// Lock a part to the ground, or let it free.
+    Lock(usize, bool),
     /// Release the held part.
     Release,
     /// Let the held part stay while the handle moves, and hold it again.
@@ -329,6 +331,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(_) => None,
         },
         Intent::Grab(part) => grab(session, *part),
+        Intent::Lock(part, locks) => session.no_locking(*part, *locks),
         Intent::Clutch(intent) => session.no_clutch(*intent),
         Intent::Release => match session.device() {
             None => no(NO_RIG),
@@ -505,7 +508,7 @@ fn grab(session: &Session, part: usize) -> Option<String> {
         Some(_) => return no("Arm the rig first"),
     }
     if !document.is_grabbable(part) {
-        return no("This part is fixed: the largest part of the assembly stays where it is");
+        return no("This part is locked to the ground: unlock it below the list of parts");
     }
     session.is_held(part).then(|| "It is held".to_owned())
 }

@@ -37,6 +37,7 @@ mod keeper;
 mod keeping;
 mod kept_groups;
 pub mod link;
+mod locking;
 pub mod moves;
 mod moving;
 pub mod notes;

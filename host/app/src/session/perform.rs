@@ -75,6 +75,7 @@ impl Session {
             Intent::ShowAll => self.show_all(),
             Intent::Grab(part) => self.grab(part),
             Intent::Release => self.request(ToDevice::Release),
+            Intent::Lock(part, locks) => self.lock(part, locks),
             Intent::Clutch(intent) => self.clutch(intent),
             Intent::ResetScene => self.put_back(),
             Intent::Move(motion) => self.move_part(&motion),

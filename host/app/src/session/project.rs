@@ -1,7 +1,8 @@
 //! The project of the open document: taken from the session, and given back to it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::DAffine3;
 use mortise_guide::When;
@@ -64,6 +65,10 @@ pub fn capture(session: &Session, document: &Document) -> Project {
         },
         parts: parts.collect(),
         groups: kept(document),
+        locked: document.grouped.locked.as_ref().map(|locked| {
+            let names = locked.iter().filter_map(|&part| document.names.get(part));
+            names.cloned().collect()
+        }),
         fits: fits.collect(),
         settings: settings(session),
         rig: Some(session.chosen.to_string()),
@@ -136,9 +141,20 @@ pub fn apply(session: &mut Session, project: &Project, source: &Source) {
     // The surfaces of a group that is not there.
     let is_left_out = |part: usize| left_out.iter().any(|group| group.parts.contains(&part));
     fits.retain(|id, _| !is_left_out(id.moving_part) && !is_left_out(id.fixed_part));
+    let locked = project.locked.as_ref().map(|locked| {
+        let parts = locked.iter().filter_map(|name| numbers.get(name).copied());
+        parts.collect::<BTreeSet<usize>>()
+    });
+    // With nothing free there would be nothing to grab.
+    let locked = locked.filter(|locked| locked.len() < poses.len());
     let counts = [
         (moved, "part moved", "parts moved"),
         (groups.iter().count(), "group", "groups"),
+        (
+            locked.as_ref().map_or(0, BTreeSet::len),
+            "part locked to the ground",
+            "parts locked to the ground",
+        ),
         (
             hidden.iter().filter(|hidden| **hidden).count(),
             "part hidden",
@@ -152,6 +168,9 @@ pub fn apply(session: &mut Session, project: &Project, source: &Source) {
     }
     session.place(poses);
     session.regroup(groups);
+    if let Some(document) = &mut session.document {
+        document.grouped = Arc::new(document.grouped.with_locked(locked));
+    }
     session.fits = fits;
     session.view.clone_from(&project.view);
     session.looks = Some(Looks {

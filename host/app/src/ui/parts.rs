@@ -260,6 +260,16 @@ fn grab(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
         control::intent_button(ui, session, wanted, button, Intent::Release, hint);
         return;
     }
+    let locked = document.grouped.is_locked(part);
+    let (text, hint) = match locked {
+        true => ("Unlock", "Let it be grabbed; it is fixed where it is now"),
+        false => (
+            "Lock to ground",
+            "Fix it where it is; what is grabbed touches it, but does not move it",
+        ),
+    };
+    let lock = Intent::Lock(part, !locked);
+    control::intent_button(ui, session, wanted, egui::Button::new(text), lock, hint);
     let button = control::primary(ui, "Grab").min_size(wide);
     let hint = match document.groups().of(part) {
         None => "Couple the handle to this part at their present positions".to_owned(),

@@ -21,6 +21,7 @@ mod kept;
 mod layout;
 #[cfg(unix)]
 mod link_loss;
+mod locking;
 mod measure;
 mod moving;
 mod page;
