@@ -220,7 +220,7 @@ impl Intent {
                 | Self::Run(_)
                 | Self::Joint(_)
                 | Self::Connections(_)
-                | Self::Rig(RigIntent::Show(_))
+                | Self::Rig(RigIntent::Show(_) | RigIntent::Draw(_))
                 | Self::Demo(_)
         )
     }

@@ -31,6 +31,8 @@ pub mod joints;
 mod keeper;
 mod keeping;
 pub mod link;
+pub mod margin;
+pub mod mechanism;
 pub mod moves;
 mod moving;
 pub mod notes;

@@ -25,6 +25,7 @@ use super::instructions::Instructions;
 use super::joints::Joints;
 use super::keeper::Keeper;
 use super::link::{Connection, Link};
+use super::margin;
 use super::moves::Moves;
 use super::notes::Notes;
 use super::outbox::{Outbox, Update};
@@ -123,6 +124,8 @@ pub struct Session {
     pub(super) played: Option<Instant>,
     /// The page on the rig.
     pub rig_page: RigPage,
+    /// Limits of stiffness and damping, of the rig for which they were computed last.
+    pub limits: margin::Kept,
     /// Firmware for a board.
     pub flashing: Flashing,
     /// Joints of a part.
@@ -199,6 +202,7 @@ impl Session {
             partner: None,
             ways: Ways::default(),
             rig_page: RigPage::default(),
+            limits: margin::Kept::default(),
             flashing: Flashing::default(),
             joints: Joints::default(),
             connections: Connections::default(),
