@@ -1,8 +1,8 @@
-//! The workspace for the rig: its description and firmware on the left, its commissioning on the right.
+//! The workspace for the rig: its description and firmware on the left, the described mechanism and its commissioning on the right.
 
 use egui::{ScrollArea, Ui, Vec2};
 
-use super::{commissioning, control, description, firmware, theme};
+use super::{commissioning, control, description, firmware, mechanism, theme};
 use crate::session::rig_page::{RigIntent, Workspace};
 use crate::session::{Intent, Session};
 
@@ -11,6 +11,9 @@ const SIDE_BY_SIDE: f32 = 640.0;
 /// Width of the two buttons that choose the workspace, points.
 pub const SWITCH: f32 = 150.0;
 
+/// A section of the page.
+type Section = fn(&mut Ui, &Session, &mut Vec<Intent>);
+
 /// Draws the page.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let side_by_side = ui.available_width() >= SIDE_BY_SIDE;
@@ -18,10 +21,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     if side_by_side {
         ui.horizontal_top(|ui| {
             let half = Vec2::new(0.5 * (size.x - 24.0), size.y);
-            for (name, draw) in [
-                ("board", board as fn(&mut Ui, &Session, &mut Vec<Intent>)),
-                ("commissioning", commissioning::show),
-            ] {
+            for (name, draw) in [("board", board as Section), ("commissioning", beside)] {
                 ui.allocate_ui(half, |ui| {
                     scrolled(ui, name, |ui| draw(ui, session, wanted));
                 });
@@ -30,7 +30,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         });
     } else {
         scrolled(ui, "rig page", |ui| {
-            commissioning::show(ui, session, wanted);
+            beside(ui, session, wanted);
             control::divider(ui);
             board(ui, session, wanted);
         });
@@ -42,6 +42,21 @@ fn board(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     description::show(ui, session, wanted);
     control::divider(ui);
     firmware::show(ui, session, wanted);
+}
+
+/// Draws what stands beside the description: commissioning, the described mechanism, and what is read of the rig, which comes before the mechanism while
+/// steps are under way.
+fn beside(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let sections: [Section; 3] = match session.rig_page.steps {
+        None => [commissioning::show, mechanism::show, commissioning::readings],
+        Some(_) => [commissioning::show, commissioning::readings, mechanism::show],
+    };
+    for (number, section) in sections.into_iter().enumerate() {
+        if number > 0 {
+            control::divider(ui);
+        }
+        section(ui, session, wanted);
+    }
 }
 
 fn scrolled(ui: &mut Ui, name: &str, draw: impl FnOnce(&mut Ui)) {

@@ -2,7 +2,6 @@
 
 mod bar;
 mod panel;
-mod scale;
 mod view;
 
 use egui::{ScrollArea, Ui, Vec2};

@@ -3,7 +3,7 @@
 use egui::{Color32, RichText, Ui, Vec2b};
 use egui_plot::{GridMark, HLine, Plot, PlotPoints, VLine};
 
-use super::scale::{self, Scale};
+use super::super::scale::{self, Scale};
 use super::view::View;
 use crate::session::Session;
 use crate::session::history::{Line, Quantity, Signal, envelope};
