@@ -18,7 +18,9 @@ mod kept;
 mod layout;
 #[cfg(unix)]
 mod link_loss;
+mod margin;
 mod measure;
+mod mechanism;
 mod moving;
 mod page;
 mod picture;
