@@ -8,8 +8,8 @@
 //! (the describing function of a quantiser; A. Gelb and W. Vander Velde, *Multiple-input describing functions*, 1968). All gains are therefore taken
 //! [`RESERVE`] times as large as they are. The measured boundaries of `docs/stability.md` then all lie beyond the drawn ones (test below).
 //!
-//! Holds for one axis of a handle that nobody holds, or that a passive hand holds which adds at least as much damping as the handle has; a held part
-//! near whose centre of mass the handle is; forces below every limit.
+//! Holds for one axis of a handle that nobody holds, or that is in a hand which damps as those of the maps do (a hundredth of a second of its stiffness);
+//! a held part near whose centre of mass the handle is; forces below every limit.
 
 use super::sampled_loop::{Axis, Gains};
 
@@ -18,10 +18,10 @@ pub const RESERVE: f64 = 4.0 / core::f64::consts::PI;
 /// Rows of a map.
 const ROWS: u32 = 80;
 /// Steps of a constant ratio in which a limit is searched, and the ratio at which bisection ends.
-const STEPS: i32 = 24;
+const STEPS: i32 = 32;
 const RATIO: f64 = 1.002;
 /// Least stiffness that is searched, as a share of the largest that is searched.
-const LEAST: f64 = 1e-3;
+const LEAST: f64 = 1e-4;
 /// See [`bears`].
 const SMALL: f64 = 0.05;
 /// The search goes this far beyond what the board takes.
@@ -112,7 +112,7 @@ impl Map {
             (self.resting(), Limit::Trembling),
             (self.most.stiffness, Limit::Board),
         ];
-        // The first of equals: what the board does not take needs no limit.
+        // The lowest, the first of equal ones.
         let (stiffness, by) = limits
             .into_iter()
             .fold((f64::INFINITY, Limit::Board), |least, limit| {

@@ -122,7 +122,7 @@ pub fn basis(plane: &Plane) -> String {
 /// What the limits hold for.
 pub fn class() -> String {
     format!(
-        "By theory, with a reserve of {:.0} % for rounded readings, where the handle is lightest; for a part held near its middle that rests in contact, and a hand that only damps.",
+        "By theory, with a reserve of {:.0} % for rounded readings, where the handle is lightest; for a part held near its middle that rests in contact, and a hand that damps, or none.",
         100.0 * (RESERVE - 1.0)
     )
 }
