@@ -47,11 +47,13 @@ fn board(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
 /// Draws what stands beside the description: commissioning, the described mechanism, and what is read of the rig, which comes before the mechanism while
 /// steps are under way.
 fn beside(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
-    let sections: [Section; 3] = match session.rig_page.steps {
-        None => [commissioning::show, mechanism::show, commissioning::readings],
-        Some(_) => [commissioning::show, commissioning::readings, mechanism::show],
+    let (steps, picture): (Section, Section) = (commissioning::show, mechanism::show);
+    let readings = session.connection().map(|_| commissioning::readings as Section);
+    let sections = match session.rig_page.steps {
+        None => [Some(steps), Some(picture), readings],
+        Some(_) => [Some(steps), readings, Some(picture)],
     };
-    for (number, section) in sections.into_iter().enumerate() {
+    for (number, section) in sections.into_iter().flatten().enumerate() {
         if number > 0 {
             control::divider(ui);
         }
