@@ -238,6 +238,7 @@ impl Intent {
                 | Self::Joint(_)
                 | Self::Connections(_)
                 | Self::Show(_)
+                | Self::Rig(RigIntent::Draw(_))
                 | Self::Demo(_)
         )
     }

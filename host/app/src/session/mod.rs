@@ -38,6 +38,8 @@ mod keeping;
 mod kept_groups;
 pub mod link;
 mod locking;
+pub mod margin;
+pub mod mechanism;
 pub mod moves;
 mod moving;
 pub mod notes;

@@ -7,6 +7,8 @@ use mortise_protocol::rig::Rig;
 use mortise_rig::commissioning::{Commissioning, operator};
 use mortise_rig::{Abilities, abilities, parse_rig, write_rig};
 
+use super::mechanism::Mechanism;
+use super::mechanism::links::Angles;
 use super::readings::ReadingsWatch;
 
 /// Time that the traces of the encoders keep, s.
@@ -43,6 +45,8 @@ pub enum RigIntent {
     },
     /// Change the text.
     Edit(String),
+    /// Change the drawn posture of the described mechanism; nothing is driven.
+    Draw(DrawIntent),
     /// Send the description to the board, which restarts.
     Send,
     /// Begin commissioning with the description that the board uses.
@@ -65,6 +69,17 @@ pub enum RigIntent {
     Simulate,
     /// Wire the simulated mechanism in this way from now on.
     Wire(Wiring),
+}
+
+/// A change of the drawn posture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DrawIntent {
+    /// Turn a joint (from 0) to an angle, rad.
+    Joint(usize, f64),
+    /// Go to the home pose.
+    Home,
+    /// Draw the joints where the connected mechanism has them, or no longer.
+    Follow(bool),
 }
 
 /// How a simulated mechanism is wired, to try commissioning with.
@@ -137,6 +152,8 @@ pub struct Checked {
     pub rig: Rig,
     /// What the rig will be able to do.
     pub abilities: Abilities,
+    /// Its mechanism, to be drawn.
+    pub mechanism: Mechanism,
 }
 
 /// See the module.
@@ -144,6 +161,9 @@ pub struct Checked {
 pub struct RigPage {
     text: String,
     checked: Option<Result<Box<Checked>, String>>,
+    /// Drawn angles, and the number of joints that they belong to.
+    drawn: (Angles, usize),
+    follows: bool,
     /// The description that the board keeps, and whether it uses it; `None`: not read yet.
     pub on_board: Option<(Option<Rig>, bool)>,
     /// Commissioning under way.
@@ -174,6 +194,50 @@ impl RigPage {
             _ => Some(check(&text)),
         };
         self.text = text;
+        if let Some(Ok(checked)) = &self.checked {
+            let mechanism = &checked.mechanism.links;
+            let joints = mechanism.ranges().len();
+            let (angles, of) = self.drawn;
+            let angles = if of == joints {
+                mechanism.clamp(angles)
+            } else {
+                mechanism.home()
+            };
+            self.drawn = (angles, joints);
+        }
+    }
+
+    /// Changes the drawn posture.
+    pub fn draw(&mut self, intent: DrawIntent) {
+        let Some(Ok(checked)) = &self.checked else { return };
+        let mechanism = &checked.mechanism.links;
+        match intent {
+            DrawIntent::Joint(joint, angle) => {
+                if let Some(known) = self.drawn.0.get_mut(joint) {
+                    *known = angle;
+                }
+                self.drawn.0 = mechanism.clamp(self.drawn.0);
+            }
+            DrawIntent::Home => self.drawn.0 = mechanism.home(),
+            DrawIntent::Follow(follows) => self.follows = follows,
+        }
+    }
+
+    /// Angles to draw, and whether they are those of the connected mechanism.
+    pub fn drawn(&self) -> (Angles, bool) {
+        let live = self.live().filter(|_| self.follows);
+        (live.unwrap_or(self.drawn.0), live.is_some())
+    }
+
+    /// Whether the connected mechanism's angles are to be drawn, where there is one.
+    pub fn follows(&self) -> bool {
+        self.follows
+    }
+
+    /// Angles of the connected mechanism, if it is the described one.
+    pub fn live(&self) -> Option<Angles> {
+        let (_, angles) = self.trace.back().filter(|_| self.is_in_use())?;
+        Some(angles.map(f64::from))
     }
 
     /// The text as a description, or what is wrong with it; `None` without text.
@@ -310,7 +374,12 @@ fn check(text: &str) -> Result<Box<Checked>, String> {
         words.unwrap_or_else(|| error.to_string())
     })?;
     let abilities = abilities(&rig).map_err(mortise_rig::describe)?;
-    Ok(Box::new(Checked { rig, abilities }))
+    let mechanism = Mechanism::new(&rig).map_err(mortise_rig::describe)?;
+    Ok(Box::new(Checked {
+        rig,
+        abilities,
+        mechanism,
+    }))
 }
 
 #[cfg(test)]
@@ -331,6 +400,30 @@ mod tests {
                 _ => panic!("{name} was damaged"),
             }
         }
+    }
+
+    #[test]
+    fn the_drawn_posture_stays_within_the_described_ranges() {
+        let mut page = RigPage::default();
+        page.draw(DrawIntent::Joint(0, 1.0));
+        assert_eq!(page.drawn(), ([0.0; 3], false), "nothing is described");
+        page.edit(EXAMPLES[0].1.to_owned());
+        let degrees = |page: &RigPage| page.drawn().0[0].to_degrees();
+        assert!((degrees(&page) - 90.0).abs() < 1e-4, "home");
+        page.draw(DrawIntent::Joint(0, 5.0));
+        assert!((degrees(&page) - 130.0).abs() < 1e-4);
+        page.edit(EXAMPLES[0].1.replace("130]", "120]"));
+        assert!((degrees(&page) - 120.0).abs() < 1e-4);
+        page.draw(DrawIntent::Home);
+        assert!((degrees(&page) - 90.0).abs() < 1e-4);
+        page.draw(DrawIntent::Joint(7, 5.0));
+        page.draw(DrawIntent::Follow(true));
+        assert!(!page.drawn().1, "no mechanism is connected");
+        page.edit(EXAMPLES[1].1.to_owned());
+        assert!(
+            (page.drawn().0[1].to_degrees() - 82.77).abs() < 1e-3,
+            "another mechanism is at home"
+        );
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::introduction::RigSent;
 use super::link::Command;
 use super::notes::Severity;
 use super::purpose::Purpose;
-use super::rig_page::RigIntent;
+use super::rig_page::{DrawIntent, RigIntent};
 use super::state::Session;
 use super::workspace::Workspace;
 
@@ -27,6 +27,7 @@ impl Session {
         let reason = match intent {
             RigIntent::Example(_) | RigIntent::Edit(_) => return None,
             RigIntent::Browse | RigIntent::Load(_) | RigIntent::End => return None,
+            RigIntent::Draw(intent) => self.no_drawing(*intent)?,
             RigIntent::SaveReport | RigIntent::WriteReport { .. } => match self.rig_page.steps {
                 Some(_) => return None,
                 None => "Begin commissioning first",
@@ -39,6 +40,18 @@ impl Session {
             _ => self.no_board_action(intent)?,
         };
         Some(reason.to_owned())
+    }
+
+    fn no_drawing(&self, intent: DrawIntent) -> Option<&'static str> {
+        let page = &self.rig_page;
+        match page.checked() {
+            None => Some("There is no description: open one, or choose an example"),
+            Some(Err(_)) => Some("Correct the description first"),
+            Some(Ok(_)) if intent != DrawIntent::Follow(true) || page.live().is_some() => None,
+            Some(Ok(_)) if self.connection().is_none() => Some("No rig is connected"),
+            Some(Ok(_)) if !page.is_in_use() => Some("The board does not use this description"),
+            Some(Ok(_)) => Some("The board has not read its encoders yet"),
+        }
     }
 
     fn no_board_action(&self, intent: &RigIntent) -> Option<&'static str> {
@@ -131,6 +144,7 @@ impl Session {
                 }
             }
             RigIntent::Edit(text) => self.rig_page.edit(text),
+            RigIntent::Draw(intent) => self.rig_page.draw(intent),
             RigIntent::Send => {
                 if let Some(Ok(checked)) = self.rig_page.checked() {
                     let rig = checked.rig.clone();

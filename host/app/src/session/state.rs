@@ -26,6 +26,7 @@ use super::instructions::Instructions;
 use super::joints::Joints;
 use super::keeper::Keeper;
 use super::link::{Connection, Link};
+use super::margin;
 use super::moves::Moves;
 use super::notes::Notes;
 use super::outbox::{Outbox, Update};
@@ -129,6 +130,8 @@ pub struct Session {
     pub workspace: Workspace,
     /// The page on the rig.
     pub rig_page: RigPage,
+    /// Limits of stiffness and damping, of the rig for which they were computed last.
+    pub limits: margin::Kept,
     /// Firmware for a board.
     pub flashing: Flashing,
     /// Joints of a part.
@@ -209,6 +212,7 @@ impl Session {
             ways: Ways::default(),
             workspace: Workspace::default(),
             rig_page: RigPage::default(),
+            limits: margin::Kept::default(),
             flashing: Flashing::default(),
             joints: Joints::default(),
             connections: Connections::default(),

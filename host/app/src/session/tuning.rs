@@ -1,9 +1,11 @@
 //! Parameters that the user sets: on the board at once, and on the same rig again when it is connected later.
 
 use mortise_protocol::parameter::{PARAMETERS, Parameter, ParameterId};
+use mortise_protocol::rig::Rig;
 use mortise_rig::RigSpec;
 
 use super::link::Link;
+use super::margin::Subject;
 use super::notes::Severity;
 use super::state::Session;
 use super::tap::GuidanceCommand;
@@ -20,6 +22,33 @@ impl Session {
         match rig {
             RigSpec::Serial { port } => port.clone(),
             RigSpec::Simulated { .. } | RigSpec::Emulated { .. } => "simulated".to_owned(),
+        }
+    }
+
+    /// The rig whose limits of stiffness and damping are shown: the connected one, else the one that the description describes, as a board with motors
+    /// would have it, else the simulated one.
+    ///
+    /// # Errors
+    /// Why the connected one is not known, as a sentence.
+    pub fn limited_rig(&self) -> Result<Subject, &'static str> {
+        let described = |rig: &Rig, real: bool| Subject::Described {
+            rig: Box::new(rig.clone()),
+            real,
+        };
+        let page = &self.rig_page;
+        let Some(connection) = self.connection() else {
+            return Ok(match page.checked() {
+                Some(Ok(checked)) => described(&checked.rig, true),
+                _ => Subject::Simulated,
+            });
+        };
+        let can = &connection.capabilities;
+        match &page.on_board {
+            Some((Some(rig), true)) => Ok(described(rig, !can.simulated)),
+            // No described mechanism has motors that turn the handle.
+            _ if can.simulated && can.torque_axes > 0 => Ok(Subject::Simulated),
+            None => Err("The description that the board uses is not known yet: read it"),
+            Some(_) => Err("The board uses no description: send it one in Set up rig"),
         }
     }
 
@@ -94,6 +123,21 @@ mod tests {
 
     fn said(session: &Session) -> Vec<&str> {
         session.notes.iter().map(|note| note.text.as_str()).collect()
+    }
+
+    /// Without a rig the limits are those of the description that is edited, as long as it is sound.
+    #[test]
+    fn limits_are_those_of_the_description_or_of_the_simulated_handle() {
+        let mut session = Session::new(std::sync::Arc::new(|| {}));
+        assert_eq!(session.limited_rig(), Ok(Subject::Simulated));
+        let (name, text) = mortise_rig::EXAMPLES[0];
+        session.rig_page.edit(text.to_owned());
+        let Ok(Subject::Described { rig, real: true }) = session.limited_rig() else {
+            panic!("the described one")
+        };
+        assert_eq!(rig.name.as_str(), name);
+        session.rig_page.edit(text.replace("radius_mm", "radius"));
+        assert_eq!(session.limited_rig(), Ok(Subject::Simulated));
     }
 
     /// A value that the simulated hand bears may shake a motor.

@@ -1,4 +1,4 @@
-//! Commissioning of the rig: the list of its steps, the present one with what to do, and the joints as they are read.
+//! Commissioning of the rig: the list of its steps, the present one with what to do; and the joints as they are read.
 
 use egui::{Color32, RichText, Ui, Vec2};
 use egui_plot::{Plot, PlotPoints};
@@ -39,8 +39,11 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         }
     }
     simulated(ui, session, wanted);
-    ui.add_space(6.0);
-    joints(ui, page);
+}
+
+/// Draws what is read of the rig: its joints, and how long its loop takes.
+pub fn readings(ui: &mut Ui, session: &Session, _: &mut Vec<Intent>) {
+    joints(ui, &session.rig_page);
     ui.add_space(6.0);
     loop_time::show(ui, session);
 }

@@ -4,16 +4,19 @@ use egui::{ComboBox, RichText, Slider, Ui, Vec2};
 use mortise_bake::Method;
 use mortise_protocol::parameter::{PARAMETERS, Parameter};
 
-use super::{control, theme};
+use super::{control, margin, theme};
 use crate::session::{Intent, Session, obstacle};
 
 /// First word of the parameters that the section on guidance shows instead.
 pub const GUIDANCE: &str = "Guidance";
 
+/// First word of the parameters of the coupling, below which its stability margin is drawn.
+const COUPLING: &str = "Coupling";
+
 /// First word of the parameters' names in a group, and the group's heading.
 const GROUPS: [(&str, &str); 5] = [
     ("Integrator", "Method"),
-    ("Coupling", "Coupling of handle and part"),
+    (COUPLING, "Coupling of handle and part"),
     ("Contact", "Contact"),
     ("Object", "Held part"),
     ("", "Limits"),
@@ -58,6 +61,9 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 }
                 for row in rows {
                     one(ui, session, wanted, row);
+                }
+                if *word == COUPLING {
+                    margin::show(ui, session, wanted);
                 }
                 ui.add_space(4.0);
             });

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use egui::Key;
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::DAffine3;
 use mortise::kept::StateFolder;
 use mortise::session::notes::Severity;
@@ -91,6 +91,16 @@ pub fn picture(harness: &Harness<'_, Window>) -> Vec<Item> {
 pub fn press(harness: &mut Harness<'_, Window>, key: Key) {
     harness.key_press(key);
     harness.run_steps(2);
+}
+
+/// Texts of the window that begin like this: names of controls and pictures, and labels.
+pub fn texts(harness: &Harness<'_, Window>, start: &str) -> Vec<String> {
+    let root = harness.root();
+    let texts = root.children_recursive().flat_map(|node| {
+        let node = node.accesskit_node();
+        [node.label(), node.value()]
+    });
+    texts.flatten().filter(|text| text.starts_with(start)).collect()
 }
 
 /// Clicks the control with this accessible name.

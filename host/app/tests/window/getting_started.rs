@@ -165,14 +165,17 @@ fn the_builders_labels_are_in_the_window() {
     let page = page();
     let steps = steps(&page, "### First start");
     let named: BTreeSet<&str> = steps.iter().flat_map(|step| labels(step)).collect();
-    assert_eq!(named, BTreeSet::from(["off", "Set home", "Position", "Fault"]));
+    assert_eq!(
+        named,
+        BTreeSet::from(["off", "Set home", "Position", "Fault", "Stability margin"])
+    );
     let mut harness = harness();
     harness.run_steps(2);
     until(&mut harness, "rigs are listed", |s| !s.rigs.is_empty());
     click(&mut harness, "Connect");
     until(&mut harness, "connected", |s| s.handle().is_some());
     harness.run_steps(2);
-    for label in ["Board", "Loop", "Position"] {
+    for label in ["Board", "Loop", "Position", "Stability margin"] {
         harness.get_by_label(label);
     }
 }

@@ -22,7 +22,9 @@ mod layout;
 #[cfg(unix)]
 mod link_loss;
 mod locking;
+mod margin;
 mod measure;
+mod mechanism;
 mod moving;
 mod page;
 mod picture;

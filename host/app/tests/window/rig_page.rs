@@ -16,7 +16,7 @@ use mortise_rig::{EXAMPLES, RigSpec};
 use crate::common::{click, harness, until};
 
 /// A window in the workspace for the rig, connected to a simulation that uses an example.
-fn described(example: &str) -> Harness<'static, Window> {
+pub fn described(example: &str) -> Harness<'static, Window> {
     let mut harness = harness();
     until(&mut harness, "rigs are listed", |s| !s.rigs.is_empty());
     let simulation = RigSpec::Simulated { realtime: true };

@@ -203,14 +203,16 @@ fn each_step_is_a_picture_and_a_click_goes_to_where_it_begins() {
     assert!(pictures(&harness) <= found.steps.len());
 }
 
-/// Points of the line of a way over the view.
+/// Points of the line of a way over the view, which ends where the panel of the rig begins: its plane of stability has lines of the same colour.
 fn ways(harness: &Harness<'_, Window>) -> Vec<usize> {
+    let panel = harness.get_by_label("Connect").rect().left();
     let accent = theme::palette(egui::Theme::Dark).accent;
     let shapes = harness.output().shapes.iter();
     shapes
         .filter_map(|clipped| match &clipped.shape {
             egui::Shape::Path(path) if path.stroke.color == ColorMode::Solid(accent) && !path.closed => {
-                Some(path.points.len())
+                let is_in_view = path.points.iter().all(|point| point.x < panel);
+                is_in_view.then_some(path.points.len())
             }
             _ => None,
         })

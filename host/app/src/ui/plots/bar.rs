@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui, Vec2};
 
-use super::scale;
+use super::super::scale;
 use super::view::View;
 use crate::session::history::Quantity;
 use crate::session::intent::Traces;

@@ -3,7 +3,6 @@
 mod bar;
 mod line;
 mod panel;
-mod scale;
 mod view;
 
 use egui::{ScrollArea, Ui, Vec2};

@@ -3,8 +3,8 @@
 use egui::{Color32, RichText, Ui, Vec2b};
 use egui_plot::{GridMark, HLine, Plot, PlotPoints, VLine};
 
+use super::super::scale::{self, Scale};
 use super::line;
-use super::scale::{self, Scale};
 use super::view::View;
 use crate::session::Session;
 use crate::session::chart::beside;
