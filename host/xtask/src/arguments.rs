@@ -29,6 +29,8 @@ pub enum Command {
     Firmware(Firmware),
     /// Make a Debian package and an archive of the program in target/package
     Package(Package),
+    /// Make the pages of docs a book of web pages with a search, in target/book
+    Book(Book),
     /// Check that docs name what exists, that files are short, that layers hold and that no modules need each other
     Tidy,
 }
@@ -148,6 +150,13 @@ pub struct Firmware {
 /// Arguments of `package`.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct Package {
+    #[command(flatten)]
+    pub installing: Installing,
+}
+
+/// Arguments of `book`.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct Book {
     #[command(flatten)]
     pub installing: Installing,
 }

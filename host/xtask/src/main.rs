@@ -1,10 +1,11 @@
-//! `cargo xtask …`: set-up, demo, tests, figures, firmware, packages and the tidy check.
+//! `cargo xtask …`: set-up, demo, tests, figures, firmware, packages, the book of the pages and the tidy check.
 //!
 //! Needs nothing but cargo. Every command starts from the repository's root, whatever the current
 //! directory, and speaks on standard error, so that standard output carries only what a program
 //! started by it (`mortise demo --json`) prints.
 
 mod arguments;
+mod book;
 mod demo;
 mod elf;
 mod figures;
@@ -48,6 +49,7 @@ fn run(command: &Command) -> Result<ExitCode> {
         Command::Fuzz(arguments) => fuzz::command(arguments),
         Command::Firmware(arguments) => firmware::command(arguments),
         Command::Package(arguments) => package::command(arguments),
+        Command::Book(arguments) => book::command(arguments),
         Command::Tidy => tidy::command(),
     }
 }

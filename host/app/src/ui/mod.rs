@@ -65,6 +65,8 @@ use egui::{Key, Modifiers, Ui};
 use self::arrange::{Arrangement, Tab};
 use crate::session::grouping::GroupIntent;
 use crate::session::link::Link;
+#[cfg(unix)]
+use crate::session::notes::Severity;
 use crate::session::workspace::Workspace;
 use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
@@ -182,6 +184,9 @@ impl Window {
             return;
         };
         self.view.six_axis.is_there = mouse.is_there();
+        for why in mouse.refusals() {
+            self.session.notes.add(Severity::Warning, why);
+        }
         let wanted = mouse.frame(Instant::now(), ui.input(|input| input.focused));
         for button in wanted.pressed {
             match button {

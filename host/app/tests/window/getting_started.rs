@@ -184,13 +184,13 @@ fn the_builders_labels_are_in_the_window() {
 enum Run {
     /// In this test, with these arguments of `mortise`; the output contains the text.
     Here(&'static [&'static str], &'static str),
-    /// Elsewhere: it needs a display or hardware, or it runs this test.
+    /// Elsewhere: it needs a display, hardware or a program to be installed, or it runs this test.
     Elsewhere(&'static str),
 }
 
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 
-const COMMANDS: [(&str, Run); 34] = [
+const COMMANDS: [(&str, Run); 35] = [
     ("cargo xtask setup", Run::Elsewhere("CI, before anything else")),
     ("cargo xtask demo", Run::Elsewhere("the step `window` plays it")),
     (
@@ -311,6 +311,10 @@ const COMMANDS: [(&str, Run); 34] = [
             &["task", SAMPLE, "insert the peg into the block", "--json"],
             "\"outcome\"",
         ),
+    ),
+    (
+        "cargo xtask book",
+        Run::Elsewhere("needs mdBook; host/xtask/src/book/pages.rs tests what that gets"),
     ),
     ("cargo xtask package", Run::Elsewhere("the step `package`")),
     (

@@ -1,17 +1,20 @@
-//! A SpaceMouse in the running window, through a socket as the daemon spacenavd has it.
+//! A SpaceMouse in the running window, through a socket as the daemon spacenavd has it, and read directly.
 
-use std::io::Write as _;
+use std::io::{self, ErrorKind, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use crate::common::{click, harness, holding, open_sample, poses, until};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use glam::DVec3;
+use mortise::session::notes::Severity;
 use mortise::ui::Window;
-use mortise::ui::space_mouse::SpaceMouse;
+use mortise::ui::space_mouse::{Event, Link, Source, SpaceMouse};
 use mortise::viewport::camera::View;
-use mortise::viewport::six_axis::Use;
+use mortise::viewport::six_axis::{Deflection, Use};
 use tempfile::TempDir;
 
 const BUTTON: &str = "SpaceMouse moves the part";
@@ -176,4 +179,79 @@ fn the_cap_moves_the_simulated_hand_and_presses_no_harder_than_its_lead() {
             .handle()
             .is_some_and(|handle| handle.translation.z > pressed + 1.0)
     });
+}
+
+/// A device that is there once, and sends what the test does.
+struct Plugged(Option<Receiver<Event>>);
+
+impl Source for Plugged {
+    fn open(&mut self) -> Result<Option<Box<dyn Link>>, String> {
+        Ok(self.0.take().map(|sent| Box::new(Cable(sent)) as Box<dyn Link>))
+    }
+}
+
+struct Cable(Receiver<Event>);
+
+impl Link for Cable {
+    fn read(&mut self, wait: Duration, events: &mut Vec<Event>) -> io::Result<()> {
+        match self.0.recv_timeout(wait) {
+            Ok(event) => events.push(event),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Err(ErrorKind::NotConnected.into()),
+        }
+        Ok(())
+    }
+}
+
+/// A device that is there and may not be read.
+struct Locked;
+
+const REFUSAL: &str = "SpaceNavigator is plugged in but may not be read by you (/dev/hidraw3).";
+
+impl Source for Locked {
+    fn open(&mut self) -> Result<Option<Box<dyn Link>>, String> {
+        Err(REFUSAL.into())
+    }
+}
+
+#[test]
+fn a_device_without_the_daemon_moves_the_view_and_one_that_may_not_be_read_is_stated() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let (device, sent) = channel();
+    let sources: Vec<Box<dyn Source>> = vec![Box::new(Locked), Box::new(Plugged(Some(sent)))];
+    let mouse = SpaceMouse::follow_sources(&harness.ctx, sources);
+    harness.state_mut().space_mouse = Some(mouse);
+    settle(&mut harness);
+    let _ = harness.get_by_label(BUTTON);
+    let _ = harness.get_by_label(REFUSAL);
+    let notes = &harness.state().session.notes;
+    let stated: Vec<_> = notes.iter().filter(|note| note.text == REFUSAL).collect();
+    assert!(
+        matches!(&stated[..], [one] if one.times == 1 && one.severity == Severity::Warning),
+        "{stated:?}"
+    );
+    harness.state_mut().view.camera.look(View::Front);
+    let camera = harness.state().view.camera;
+    let push = Event::Deflected(Deflection {
+        shift: DVec3::X,
+        turn: DVec3::ZERO,
+    });
+    for _ in 0..5 {
+        device.send(push).expect("read");
+        std::thread::sleep(Duration::from_millis(20));
+        harness.step();
+    }
+    let by = harness.state().view.camera.target - camera.target;
+    assert!(by.dot(camera.right()) < -1.0, "the scene goes right: {by}");
+    device.send(Event::Pressed(0)).expect("read");
+    settle(&mut harness);
+    assert_eq!(harness.state().view.six_axis.used, Use::Part);
+    // It is unplugged in mid-push.
+    drop(device);
+    settle(&mut harness);
+    assert!(harness.query_by_label(BUTTON).is_none());
+    let there = harness.state().view.camera;
+    settle(&mut harness);
+    assert_eq!(harness.state().view.camera, there);
 }

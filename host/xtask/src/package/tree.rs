@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::shell;
 
 /// Files of `host/app/package`, and of the repository's root, with their places.
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 8] = [
     (
         "host/app/package/mortise.desktop",
         "share/applications/mortise.desktop",
@@ -24,6 +24,10 @@ const FILES: [(&str, &str); 7] = [
     (
         "host/app/package/mortise.svg",
         "share/icons/hicolor/scalable/apps/mortise.svg",
+    ),
+    (
+        "host/app/package/70-mortise-space-mouse.rules",
+        "lib/udev/rules.d/70-mortise-space-mouse.rules",
     ),
     ("LICENSE-APACHE", "share/doc/mortise/LICENSE-APACHE"),
     ("LICENSE-MIT", "share/doc/mortise/LICENSE-MIT"),

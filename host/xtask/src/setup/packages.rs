@@ -15,10 +15,12 @@ pub enum Group {
     Screen,
     /// Making packages of the program.
     Package,
+    /// Making the book of the pages, by its command alone.
+    Book,
 }
 
 impl Group {
-    /// Every group, in the order of reports.
+    /// Every group but [`Group::Book`], in the order of reports: what set-up and the tests install.
     pub const ALL: [Self; 6] = [
         Self::Build,
         Self::Checks,
@@ -41,6 +43,7 @@ impl Group {
             Self::Board => "for the emulated board: QEMU, and Rust's target for the microcontroller",
             Self::Window => "to open a window: graphics drivers and input libraries",
             Self::Package => "to make packages of the program: patchelf and dpkg-dev",
+            Self::Book => "to make the book of the pages: mdBook",
             Self::Screen => {
                 "to test the window without a display: Xvfb, xdotool, ImageMagick, a message bus, a Japanese font"
             }

@@ -1,4 +1,4 @@
-//! Parts of the Rust toolchain: the microcontroller's target, rustfmt, clippy and cargo-deny.
+//! Parts of the Rust toolchain: the microcontroller's target, rustfmt, clippy, cargo-deny and mdBook.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,10 +22,12 @@ pub enum Part {
     Clippy,
     /// `cargo deny`, of any version that reads `deny.toml`.
     Deny,
+    /// `mdbook`, of any version that reads `docs/book.toml`.
+    Book,
 }
 
 impl Part {
-    const ALL: [Self; 4] = [Self::Target, Self::Rustfmt, Self::Clippy, Self::Deny];
+    const ALL: [Self; 5] = [Self::Target, Self::Rustfmt, Self::Clippy, Self::Deny, Self::Book];
 
     /// Name in rustup or cargo.
     pub fn name(self) -> &'static str {
@@ -34,6 +36,7 @@ impl Part {
             Self::Rustfmt => "rustfmt",
             Self::Clippy => "clippy",
             Self::Deny => "cargo-deny",
+            Self::Book => "mdbook",
         }
     }
 
@@ -42,6 +45,7 @@ impl Part {
         match self {
             Self::Target => Group::Board,
             Self::Rustfmt | Self::Clippy | Self::Deny => Group::Checks,
+            Self::Book => Group::Book,
         }
     }
 
@@ -58,6 +62,12 @@ impl Part {
             Self::Rustfmt | Self::Clippy => ("rustup", vec!["component", "add", self.name()]),
             // Versions from its own lock file, with which it is known to build; not optimised, which takes a third of the time and is fast enough.
             Self::Deny => ("cargo", vec!["install", "--locked", "--debug", self.name()]),
+            // Likewise, and without its web server.
+            Self::Book => {
+                let features = ["--no-default-features", "--features", "search"];
+                let words = [&["install", "--locked", "--debug"][..], &features, &[self.name()]];
+                ("cargo", words.concat())
+            }
         }
     }
 
@@ -75,7 +85,7 @@ impl Part {
                 .is_dir(),
             Self::Rustfmt => program("rustfmt").is_file() && program("cargo-fmt").is_file(),
             Self::Clippy => program("clippy-driver").is_file() && program("cargo-clippy").is_file(),
-            Self::Deny => shell::find_program(self.name()).is_some(),
+            Self::Deny | Self::Book => shell::find_program(self.name()).is_some(),
         }
     }
 }
@@ -128,7 +138,11 @@ mod tests {
     fn parts_are_seen_by_their_files() {
         let place = tempfile::tempdir().unwrap();
         let sysroot = place.path();
-        let parts = || Part::ALL.into_iter().filter(|part| *part != Part::Deny);
+        let parts = || {
+            Part::ALL
+                .into_iter()
+                .filter(|part| !matches!(part, Part::Deny | Part::Book))
+        };
         assert!(parts().all(|part| !part.is_in(sysroot)));
         std::fs::create_dir_all(sysroot.join("lib/rustlib/thumbv7em-none-eabihf/lib")).unwrap();
         std::fs::create_dir_all(sysroot.join("bin")).unwrap();

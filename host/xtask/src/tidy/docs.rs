@@ -143,7 +143,7 @@ fn matches_name(pattern: &str, name: &str) -> bool {
 }
 
 /// The file a link leads to, from the root; `None` for the web, for this page and for what lies outside.
-fn linked_file(from: &Path, target: &str) -> Option<PathBuf> {
+pub fn linked_file(from: &Path, target: &str) -> Option<PathBuf> {
     let target = target.split('#').next()?;
     if target.is_empty() || target.contains("://") || target.starts_with("mailto:") {
         return None;
@@ -185,7 +185,8 @@ fn code_spans(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .flat_map(|(number, line, _)| line.split('`').skip(1).step_by(2).map(move |span| (number, span)))
 }
 
-fn links(text: &str) -> impl Iterator<Item = (usize, &str)> {
+/// Targets of the links of a page, with their lines; those in code blocks are none.
+pub fn links(text: &str) -> impl Iterator<Item = (usize, &str)> {
     lines(text)
         .filter(|(.., block)| !block)
         .flat_map(|(number, line, _)| {

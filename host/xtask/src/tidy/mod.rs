@@ -2,6 +2,7 @@
 
 mod circles;
 mod commands;
+mod contents;
 mod docs;
 mod finding;
 mod functions;
@@ -17,8 +18,10 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 
+pub use self::docs::{linked_file, links};
 pub use self::finding::{Finding, report};
 pub use self::layers::target_directory;
+pub use self::tree::files;
 
 use crate::program::Programs;
 use crate::{figures, shell};
@@ -40,13 +43,13 @@ pub fn command() -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, import circles, subjects of commits, what
+/// Checks that need no program: paths in docs, the book's contents, length and words of sources, reasons for `unsafe`, layers, import circles, subjects of commits, what
 /// figures were made from.
 ///
 /// # Errors
 /// When a file cannot be read, or cargo cannot describe the workspace.
 pub fn check(root: &Path) -> Result<Vec<Finding>> {
-    let files = tree::files(root)?;
+    let files = files(root)?;
     let mut findings = Vec::new();
     for file in &files {
         findings.extend(sources::check(root, file)?);
@@ -54,6 +57,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
         findings.extend(words::check(root, file)?);
     }
     findings.extend(docs::check_paths(root, &files)?);
+    findings.extend(contents::check(root, &files)?);
     findings.extend(layers::check(root, &files)?);
     findings.extend(circles::check(root, &files)?);
     findings.extend(functions::check(root, &files)?);
@@ -74,7 +78,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
 pub fn check_commands(root: &Path, programs: &Programs) -> Result<Vec<Finding>> {
     let mut helps = commands::Helps::new(programs);
     let mut findings = Vec::new();
-    for page in docs::pages(&tree::files(root)?) {
+    for page in docs::pages(&files(root)?) {
         let text = tree::read(root, page)?;
         for (line, command) in docs::commands(&text) {
             if let Some(what) = helps.complaint(&command)? {
