@@ -63,12 +63,14 @@ impl Session {
 
     pub(super) fn perform_on_groups(&mut self, intent: &GroupIntent) {
         let Some(document) = &self.document else { return };
+        let mut selected = None;
         let (groups, name) = match intent {
             GroupIntent::Group(parts) => {
                 let Some(group) = group_of(document, whole(document, parts)) else {
                     return;
                 };
                 let name = format!("group {}", group.name);
+                selected = Some(group.parts().to_vec());
                 (document.groups().with(group), name)
             }
             GroupIntent::Ungroup(part) => {
@@ -77,6 +79,9 @@ impl Session {
             }
         };
         self.regroup(groups);
+        if let Some(parts) = selected {
+            self.select_these(&parts);
+        }
         if let Some(document) = &self.document
             && self.moves.generation == Some(document.generation)
         {

@@ -152,7 +152,9 @@ pub fn assembly(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, name:
     let ink = theme::of(ui);
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         if parts.len() > 1 {
-            let button = Button::new(RichText::new("Group").small()).frame(false);
+            ui.add_space(6.0);
+            let text = RichText::new("Group").small().color(ink.text_weak);
+            let button = Button::new(text).frame(false);
             let intent = Intent::Group(GroupIntent::Group(parts.to_vec()));
             let hint = "Grab and move its parts as one, as they are to one another";
             control::intent_button(ui, listed.session, wanted, button, intent, hint)

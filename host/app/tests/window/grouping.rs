@@ -174,6 +174,7 @@ fn a_subassembly_is_grouped_at_once_and_has_its_name() {
     click(&mut harness, "Group pins");
     until(&mut harness, "it is baked", is_baked);
     harness.run_steps(3);
+    assert_eq!(harness.state().session.selection(), PINS, "it is selected");
     let groups = document(&harness.state().session).groups();
     assert_eq!(groups.of(2).map(|group| group.name.as_str()), Some("pins"));
     // No clearance within the group is listed, and its joints are those of both pins.
