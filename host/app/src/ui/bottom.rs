@@ -68,7 +68,7 @@ fn fold(ui: &mut Ui, opens: bool, wanted: &mut Vec<Intent>) {
         true => ("Plots and messages", "Show plots and messages"),
         false => ("Fold", "Fold plots and messages to the newest message"),
     };
-    let button = egui::Button::new(RichText::new(text).size(12.5));
+    let button = egui::Button::new(RichText::new(text).small()).frame(opens);
     if ui.add(button).on_hover_text(hint).clicked() {
         wanted.push(Intent::Fold {
             section: SECTION,

@@ -107,6 +107,7 @@ fn file(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<Intent
     }
     if ui.available_width() > workspaces::WIDTH + 60.0 {
         workspaces::show(ui, session, wanted, height);
+        ui.add_space(GAP);
         ui.spacing_mut().item_spacing.x = GAP;
     }
     if ui.available_width() > 40.0 {

@@ -15,6 +15,8 @@ use crate::session::tree::{self, Branch};
 use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 
+/// Height of what is known of a part and its buttons, points.
+const DETAILS: f32 = 218.0;
 /// By how much a name with a button beside it is higher than one without, points.
 const UNGROUP: f32 = 6.0;
 /// Distance of the parts of a group from the left, points.
@@ -53,8 +55,8 @@ pub fn show(
     let details = session.selected.filter(|&p| p < document.model.parts.len());
     let room = match details {
         None => 0.0,
-        Some(part) if document.groups().of(part).is_some() => 188.0 + UNGROUP + fields.height(ui),
-        Some(_) => 188.0 + fields.height(ui),
+        Some(part) if document.groups().of(part).is_some() => DETAILS + UNGROUP + fields.height(ui),
+        Some(_) => DETAILS + fields.height(ui),
     };
     ScrollArea::vertical()
         .id_salt("tree")

@@ -1,5 +1,7 @@
 //! Parts moved in the window by handles, keys and numbers, and undo and redo of every move.
 
+use std::time::{Duration, Instant};
+
 use crate::common::{arm, click, connect, harness, holding, open_sample, poses, until};
 use egui::{Event, Key, Modifiers, Pos2};
 use egui_kittest::Harness;
@@ -506,7 +508,12 @@ fn the_clutch_leaves_the_part_and_holds_it_again_without_a_jump() {
         harness.state_mut().session.move_hand(insertion::hold(&to));
         until(harness, "the hand is there", move |s| {
             let handle = s.handle().expect("a handle");
-            (handle.translation - to.translation).length() < 0.01
+            (handle.translation - to.translation).length() < 0.2
+        });
+        // It comes to rest.
+        let begun = Instant::now();
+        until(harness, "time has passed", move |_| {
+            begun.elapsed() > Duration::from_millis(300)
         });
     };
     let free = DVec3::new(0.0, 0.0, 4.0);
