@@ -18,7 +18,7 @@ use crate::viewport::gesture::Viewpoint;
 /// Height of what is known of a part and its buttons, points.
 const DETAILS: f32 = 218.0;
 /// By how much a name with a button beside it is higher than one without, points.
-const UNGROUP: f32 = 6.0;
+const UNGROUP: f32 = 12.0;
 /// Distance of the parts of a group from the left, points.
 const INDENT: f32 = 34.0;
 
