@@ -35,8 +35,12 @@ const OWN_THREADS: &str = "mortise-";
 const BOARD_THREAD: &str = "mortise-board";
 /// Duration of a measurement: the time between two frames of an idle window.
 const IDLE_SPAN: Duration = Duration::from_secs(60);
-/// Number of measurements, of which one must hold: reading and baking come first.
+/// Number of measurements, of which one must hold: something else on the computer may slow one.
 const IDLE_SPANS: usize = 3;
+/// The window is idle once it has drawn nothing in each of so many seconds: reading, baking and connecting come first.
+const QUIET: u32 = 4;
+/// Processor time of a second in which nothing is drawn, s: a frame of this size takes ten times as much or more.
+const QUIET_S: f64 = 0.03;
 
 /// Smallest number of different frames: opening and baking the sample show a few, and live plots a new one each time.
 const PICTURES_MIN: usize = 10;
@@ -141,6 +145,7 @@ fn idle_times(root: &Path, program: &Path, screen: &Screen, place: &Path) -> Res
     if wide > SCREEN.0 || high > SCREEN.1 {
         bail!("at twice the scale the window is {wide} × {high}, larger than the screen");
     }
+    quiet(&mut child, &log)?;
     let mut said = String::new();
     for _ in 0..IDLE_SPANS {
         let before = processor_s(child.0.id())?;
@@ -165,6 +170,26 @@ fn idle_times(root: &Path, program: &Path, screen: &Screen, place: &Path) -> Res
     )
 }
 
+/// Waits until the window draws nothing any more.
+fn quiet(child: &mut Running, log: &Path) -> Result<()> {
+    let deadline = Instant::now() + PATIENCE;
+    let mut seconds = 0;
+    while seconds < QUIET {
+        let [before, _] = processor_s(child.0.id())?;
+        std::thread::sleep(Duration::from_secs(1));
+        ended(child, log)?;
+        let [after, _] = processor_s(child.0.id())?;
+        seconds = if after - before <= QUIET_S { seconds + 1 } else { 0 };
+        if Instant::now() > deadline {
+            bail!(
+                "the window still draws after {} s with nothing moving",
+                PATIENCE.as_secs()
+            );
+        }
+    }
+    Ok(())
+}
+
 /// An error if the program has ended.
 fn ended(child: &mut Running, log: &Path) -> Result<()> {
     match child.0.try_wait()? {
@@ -176,13 +201,13 @@ fn ended(child: &mut Running, log: &Path) -> Result<()> {
     }
 }
 
-/// Processor time of baking the sample, s: the smallest of several.
+/// Processor time of baking the sample anew, s: the smallest of several.
 fn bake_s(root: &Path, program: &Path, place: &Path) -> Result<f64> {
     let mut least = f64::INFINITY;
     for _ in 0..3 {
         let before = children_s()?;
         let mut bake = Command::new(program);
-        bake.args(["bake", SAMPLE, "--force", "-o"])
+        bake.args(["bake", SAMPLE, "--no-cache", "--force", "-o"])
             .arg(place.join("sample.img"));
         shell::read(bake.current_dir(root))?;
         least = least.min(children_s()? - before);
