@@ -259,4 +259,26 @@ mod tests {
         assert!(Arc::ptr_eq(&none.model, &none.file));
         assert_eq!(none.extents.len(), none.file.shapes.len());
     }
+    #[test]
+    fn any_part_or_group_is_locked_and_parts_of_one_name_are_distinguished() {
+        let named = |names: &[&str]| Grabbable::Named(names.iter().map(|name| (*name).to_owned()).collect());
+        let pegs = grouped();
+        assert!(pegs.is_locked(0) && !pegs.is_locked(1));
+        // A group is locked whole, and comes free whole.
+        let pegs = pegs.with_locked(Some(pegs.locking(2, true)));
+        assert!([0, 1, 2].iter().all(|part| pegs.is_locked(*part)));
+        let pegs = pegs.with_locked(Some(pegs.locking(0, false)));
+        assert_eq!(pegs.grabbable(), named(&["block"]));
+        let pegs = pegs.with_locked(Some(pegs.locking(1, false)));
+        assert_eq!(pegs.grabbable(), named(&["block", "pegs"]));
+        // What is locked stays so under other groups, and one of several parts of a name can be.
+        let mut none = pegs
+            .with_locked(Some(pegs.locking(0, true)))
+            .regrouped(Groups::default());
+        Arc::make_mut(&mut none.model).parts[2].name = "peg".into();
+        assert_eq!(none.grabbable(), named(&["peg", "peg (2)"]));
+        let one = none.with_locked(Some(none.locking(1, true)));
+        assert_eq!(one.grabbable(), named(&["peg (2)"]));
+        assert_eq!(one.bodies().0.parts[1].name, "peg");
+    }
 }

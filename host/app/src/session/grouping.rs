@@ -45,6 +45,9 @@ impl Session {
                     all if all.len() == document.poses.len() => {
                         no("All parts as one touch nothing: leave one out of the group")
                     }
+                    all if leaves_none_free(document, all) => no(
+                        "Nothing would be left to grab, because a part of the group is locked to the ground: unlock it first",
+                    ),
                     all => (all.iter().find(open)).map(|&part| {
                         let name = document.part_name(part);
                         format!("{name} has no surface that could touch anything: leave it out of the group")
@@ -124,6 +127,15 @@ fn whole(document: &Document, parts: &[usize]) -> Vec<usize> {
     all.sort_unstable();
     all.dedup();
     all
+}
+
+/// Whether parts as a group are locked to the ground, and everything else is.
+fn leaves_none_free(document: &Document, group: &[usize]) -> bool {
+    let grouped = &document.grouped;
+    // Where nothing was chosen, a group that has the largest part may be grabbed.
+    grouped.locked.is_some()
+        && group.iter().any(|part| grouped.is_locked(*part))
+        && (0..document.poses.len()).all(|part| group.contains(&part) || grouped.is_locked(part))
 }
 
 /// Whether a part of the file has triangles.

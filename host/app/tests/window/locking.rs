@@ -1,7 +1,10 @@
 //! Parts locked to the ground, and let free: which may be grabbed, and that it is kept.
 
 use crate::common::{arm, click, connect, harness, harness_on, open_sample, poses, until};
+use mortise::session::grouping::GroupIntent;
 use mortise::session::{Intent, Session, obstacle};
+
+use crate::groups::{PINS, opened};
 
 fn is_baked(session: &Session) -> bool {
     session
@@ -65,4 +68,21 @@ fn what_is_locked_comes_back_at_the_next_start() {
     let mut harness = harness_on(folder.path());
     open_sample(&mut harness);
     assert_eq!(grabbable(&harness.state().session), [true, false]);
+}
+
+/// Grouped with a locked part, the last free ones would be locked as well.
+#[test]
+fn a_group_that_leaves_nothing_to_grab_is_refused() {
+    let mut harness = opened();
+    let group = Intent::Group(GroupIntent::Group(PINS.to_vec()));
+    for part in (0..poses(&harness).len()).filter(|part| *part != PINS[1]) {
+        assert_eq!(obstacle(&harness.state().session, &group), None);
+        let lock = Intent::Lock(part, true);
+        if obstacle(&harness.state().session, &lock).is_none() {
+            harness.state_mut().session.act(lock);
+            until(&mut harness, "it is baked again", is_baked);
+        }
+    }
+    let reason = obstacle(&harness.state().session, &group).expect("a reason");
+    assert!(reason.contains("Nothing would be left to grab"), "{reason}");
 }

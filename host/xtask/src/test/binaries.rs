@@ -1,7 +1,7 @@
-//! Test programs, run several at a time.
+//! Test programs, run as many at a time as the machine has cores.
 //!
 //! `cargo test` runs them one after the other, and most end with one long test beside which the other cores have nothing to do. Here each runs one
-//! test at a time and several run at once, so that no core waits.
+//! test at a time and several run at once: no core waits, and no more tests run side by side than under `cargo test`.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, PipeReader, Write};

@@ -151,20 +151,11 @@ pub fn unit(bench: &mut Bench) -> Result<String> {
         command: examples,
     };
     let counts = &mut bench.counts;
-    // One more than there are cores: the longest, those of the window and of recordings, wait for a rig in real time half of theirs.
-    let at_once = 1 + std::thread::available_parallelism().map_or(1, usize::from);
-    binaries::run(
-        &bench.root,
-        &mut build,
-        examples,
-        &LONGEST,
-        at_once,
-        seed,
-        |line| {
-            println!("{line}");
-            counts.add_line(line);
-        },
-    )?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    binaries::run(&bench.root, &mut build, examples, &LONGEST, cores, seed, |line| {
+        println!("{line}");
+        counts.add_line(line);
+    })?;
     some_ran(bench)
 }
 
