@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use mortise::session::history::Quantity;
 use mortise::session::insertion::hold;
 use mortise::session::link::Link;
@@ -33,7 +33,14 @@ fn record_touch(harness: &mut Harness<'_, Window>, wait_s: f64) -> PathBuf {
     let handle = harness.state().session.handle().expect("a handle");
     let down = DAffine3::from_translation(DVec3::new(3.0, 0.0, -40.0));
     harness.state_mut().session.move_hand(hold(&(down * handle)));
-    pass(harness, 1.0);
+    until(harness, "it presses", |s| {
+        let force = s
+            .telemetry
+            .as_ref()
+            .map(|sample| Vec3::from(sample.contact.force));
+        force.is_some_and(|force| force.length() > 1.0)
+    });
+    pass(harness, 0.3);
     harness.state_mut().session.act(Intent::EndRecording);
     until(harness, "the end", |s| s.recording.is_none());
     path

@@ -1,6 +1,6 @@
 //! Parts moved in the window by handles, keys and numbers, and undo and redo of every move.
 
-use std::time::{Duration, Instant};
+use std::cell::Cell;
 
 use crate::common::{arm, click, connect, harness, holding, open_sample, poses, until};
 use egui::{Event, Key, Modifiers, Pos2};
@@ -510,10 +510,20 @@ fn the_clutch_leaves_the_part_and_holds_it_again_without_a_jump() {
             let handle = s.handle().expect("a handle");
             (handle.translation - to.translation).length() < 0.2
         });
-        // It comes to rest.
-        let begun = Instant::now();
-        until(harness, "time has passed", move |_| {
-            begun.elapsed() > Duration::from_millis(300)
+        // It comes to rest: a tenth of a second of the board without a motion.
+        let last = Cell::new(None);
+        until(harness, "it rests", move |s| {
+            let (Some(sample), Some(handle)) = (&s.telemetry, s.handle()) else {
+                return false;
+            };
+            let (tick, at) = (sample.tick, handle.translation);
+            match last.get() {
+                Some((then, _)) if tick.wrapping_sub(then) < 100 => false,
+                before => {
+                    last.set(Some((tick, at)));
+                    before.is_some_and(|(_, was): (u32, DVec3)| (at - was).length() < 0.005)
+                }
+            }
         });
     };
     let free = DVec3::new(0.0, 0.0, 4.0);

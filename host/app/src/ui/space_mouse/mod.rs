@@ -1,6 +1,6 @@
 //! A SpaceMouse, read through the daemon spacenavd where there is one, else directly.
 //!
-//! A thread of its own reads it ([`watch`]); the window takes what it has sent once a frame.
+//! A thread of its own reads it (`watch`); the window takes what it has sent once a frame.
 
 mod daemon;
 #[cfg(target_os = "linux")]
