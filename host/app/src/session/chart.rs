@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use mortise_page::escaped;
 
-use super::history::{History, Line, Quantity, SIGNALS, Signal, envelope};
+use super::history::{History, Line, Quantity, Signal, envelope};
 use super::runs::{MOST_RUNS, Playback};
 
 /// Size of the part of a chart that has lines, pixels.
@@ -232,15 +232,6 @@ impl<'s> Chart<'s> {
     }
 }
 
-/// The signals of these keys; a key that no signal has is left out.
-pub fn signals<'k>(keys: impl IntoIterator<Item = &'k str>) -> Vec<&'static Signal> {
-    let keys: Vec<&str> = keys.into_iter().collect();
-    SIGNALS
-        .iter()
-        .filter(|signal| keys.contains(&signal.key))
-        .collect()
-}
-
 /// A number with as many digits as a span needs.
 fn label(value: f64, span: f64) -> String {
     let digits = (2.0 - span.max(1e-9).log10()).clamp(0.0, 4.0) as usize;
@@ -280,7 +271,8 @@ mod tests {
     #[test]
     fn a_picture_has_a_chart_for_each_quantity_that_has_values() {
         let playback = Playback::new(run(0.5), false);
-        let chosen = signals(["contact_force_n", "handle_force_n", "points", "none"]);
+        let keys = ["contact_force_n", "handle_force_n", "points"];
+        let chosen = keys.map(|key| Signal::named(key).expect("a signal"));
         let charts = charts(&playback.run().history, Some(&playback), &chosen, [0.0, 2.0]);
         let svg = picture(&charts);
         assert_eq!(svg.matches("<g ").count(), charts.len());

@@ -91,19 +91,27 @@ impl Grouped {
 
     /// The model without the parts that another one stands for, and the number of each of its parts here. Where parts are locked, each name is that of one part.
     pub fn bodies(&self) -> (Arc<CadModel>, Vec<usize>) {
-        let stands = |&part: &usize| self.groups.first(part) == part;
-        let numbers: Vec<usize> = (0..self.model.parts.len()).filter(stands).collect();
+        let (parts, numbers) = self.body_parts();
         if self.groups.is_empty() && self.locked.is_none() {
             return (Arc::clone(&self.model), numbers);
         }
         let mut model = CadModel::clone(&self.model);
-        model.parts = (numbers.iter())
+        model.parts = parts;
+        (Arc::new(model), numbers)
+    }
+
+    /// The parts of [`Self::bodies`], and their numbers here. Cost: that of copying names, without geometry.
+    fn body_parts(&self) -> (Vec<Part>, Vec<usize>) {
+        let stands = |&part: &usize| self.groups.first(part) == part;
+        let numbers: Vec<usize> = (0..self.model.parts.len()).filter(stands).collect();
+        let mut parts: Vec<Part> = numbers
+            .iter()
             .map(|&part| self.model.parts[part].clone())
             .collect();
         if self.locked.is_some() {
-            name_apart(&mut model.parts);
+            name_apart(&mut parts);
         }
-        (Arc::new(model), numbers)
+        (parts, numbers)
     }
 
     /// The part that has a face of this part's shape here, and the face's number there; `None`: there is no such face.
@@ -128,10 +136,10 @@ impl Grouped {
     /// group.
     pub fn grabbable(&self) -> Grabbable {
         if self.locked.is_some() {
-            let (model, numbers) = self.bodies();
+            let (parts, numbers) = self.body_parts();
             let free = numbers
                 .iter()
-                .zip(&model.parts)
+                .zip(&parts)
                 .filter(|(part, _)| !self.is_locked(**part));
             return Grabbable::Named(free.map(|(_, part)| part.name.clone()).collect());
         }

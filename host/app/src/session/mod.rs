@@ -43,6 +43,7 @@ pub mod mechanism;
 pub mod moves;
 mod moving;
 pub mod notes;
+pub mod number;
 pub mod outbox;
 mod perform;
 mod place;

@@ -69,6 +69,8 @@ impl Session {
             RunIntent::Remove(index) => {
                 if self.playback.as_mut().is_some_and(|p| p.remove(index)) {
                     self.show_frame();
+                    // Parts that no run moves any more are the operator's.
+                    self.before_run = self.before_run.take().filter(|_| self.replays());
                 } else {
                     self.close_run();
                 }

@@ -41,7 +41,7 @@ pub struct Run {
     duration_s: f64,
     /// Checksums of the collision models that were on the board.
     pub scenes: Vec<u32>,
-    /// Ticks at which the board began to count, and the times, s.
+    /// First tick of each stretch in which the board counted on, and its time in the run, s.
     starts: Vec<(u32, f64)>,
     newest_tick: Option<u32>,
     tick_hz: u16,

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use mortise_page::escaped;
 
-use super::chart::{charts, signals};
+use super::chart::charts;
 use super::history::{Signal, distribution};
 use super::run::Run;
 use super::run_table::{RUN_FIGURES, models};
@@ -37,7 +37,8 @@ pub fn html(playback: &Playback) -> String {
     );
     table(&mut page, playback);
     let range_s = [0.0, run.duration_s().max(1e-3)];
-    for chart in charts(&run.history, Some(playback), &signals(DRAWN), range_s) {
+    let signals: Vec<&Signal> = DRAWN.iter().filter_map(|key| Signal::named(key)).collect();
+    for chart in charts(&run.history, Some(playback), &signals, range_s) {
         chart.html(&mut page);
     }
     let _ = write!(

@@ -122,8 +122,20 @@ fn draw(ui: &Ui, rect: Rect, map: &Map, margin: &Margin) {
     diagram.grid(&ui.painter_at(rect), ink);
     let painter = ui.painter_at(diagram.rect);
     let resting = map.resting();
-    strip(&painter, &diagram, map, f64::INFINITY, mix(ink, 0.16));
-    strip(&painter, &diagram, map, resting, mix(ink, 0.36));
+    strip(
+        &painter,
+        &diagram,
+        map,
+        f64::INFINITY,
+        ink.card.lerp_to_gamma(ink.accent, 0.16),
+    );
+    strip(
+        &painter,
+        &diagram,
+        map,
+        resting,
+        ink.card.lerp_to_gamma(ink.accent, 0.36),
+    );
     lines(&painter, &diagram, map, ink);
     if resting < most.x {
         let ends = [DVec2::new(resting, 0.0), DVec2::new(resting, most.y)];
@@ -141,16 +153,6 @@ fn draw(ui: &Ui, rect: Rect, map: &Map, margin: &Margin) {
     let corner = [DVec2::new(most.x, 0.0), most, DVec2::new(0.0, most.y)];
     diagram.dashed(&painter, &corner, Stroke::new(1.2, ink.text_weak));
     point(&painter, &diagram, &margin.gains, ink);
-}
-
-fn mix(ink: &Palette, share: f32) -> Color32 {
-    let blend = |a: u8, b: u8| (f32::from(a) + share * (f32::from(b) - f32::from(a))) as u8;
-    let (from, to) = (ink.card, ink.accent);
-    Color32::from_rgb(
-        blend(from.r(), to.r()),
-        blend(from.g(), to.g()),
-        blend(from.b(), to.b()),
-    )
 }
 
 /// Fills what is stable up to a stiffness.

@@ -1,6 +1,6 @@
 //! The mechanism that the description describes, drawn within its reach, with a slider for each joint. Nothing is driven: the sliders move the drawing.
 
-use egui::{Align2, Color32, Mesh, Painter, Pos2, Rect, RichText, Sense, Shape, Slider, Stroke, Ui, Vec2};
+use egui::{Align2, Mesh, Painter, Pos2, Rect, RichText, Sense, Shape, Slider, Stroke, Ui, Vec2};
 use egui::{Role, WidgetInfo};
 use glam::DVec2;
 
@@ -186,13 +186,7 @@ impl Drawing<'_> {
 fn fill(painter: &Painter, diagram: &Diagram, region: &Region, ink: &Palette) {
     let color = |share: f64| {
         let share = FADED + (FULL - FADED) * share as f32;
-        let blend = |a: u8, b: u8| (f32::from(a) + share * (f32::from(b) - f32::from(a))) as u8;
-        let (from, to) = (ink.card, ink.accent);
-        Color32::from_rgb(
-            blend(from.r(), to.r()),
-            blend(from.g(), to.g()),
-            blend(from.b(), to.b()),
-        )
+        ink.card.lerp_to_gamma(ink.accent, share)
     };
     let least = |cell: &Cell| cell.shares.iter().copied().fold(1.0, f64::min);
     let mut cells: Vec<&Cell> = region.cells.iter().collect();

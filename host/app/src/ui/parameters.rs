@@ -5,6 +5,7 @@ use mortise_bake::Method;
 use mortise_protocol::parameter::{PARAMETERS, Parameter};
 
 use super::{control, margin, theme};
+use crate::session::number::number;
 use crate::session::{Intent, Session, obstacle};
 
 /// First word of the parameters that the section on guidance shows instead.
@@ -147,10 +148,10 @@ fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parame
     let hover = format!(
         "{}\n{} to {} {}, at start {}",
         row.description.trim(),
-        short(row.min),
-        short(row.max),
+        number(row.min.into()),
+        number(row.max.into()),
         row.unit,
-        short(row.default)
+        number(row.default.into())
     );
     let name = words(row.name);
     ui.spacing_mut().item_spacing.y = 1.0;
@@ -170,7 +171,7 @@ fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parame
         // Ranges over more than two decades (factor 150) have a logarithmic slider.
         .logarithmic(row.min > 0.0 && row.max / row.min > 150.0)
         .suffix(format!(" {}", row.unit))
-        .custom_formatter(|value, _| short(value as f32));
+        .custom_formatter(|value, _| number(value));
     let response = ui
         .add_enabled(reason.is_none(), slider)
         .labelled_by(label.inner.id);
@@ -196,25 +197,6 @@ pub fn words(name: &str) -> String {
         }
     }
     text
-}
-
-/// A number with three or four significant digits, without trailing zeros.
-fn short(value: f32) -> String {
-    let magnitude = value.abs();
-    let decimals = match magnitude {
-        m if m >= 100.0 || m == 0.0 => 0,
-        m if m >= 10.0 => 1,
-        m if m >= 1.0 => 2,
-        m if m >= 0.1 => 3,
-        m if m >= 0.001 => 4,
-        _ => 6,
-    };
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
 }
 
 #[cfg(test)]
@@ -268,10 +250,10 @@ mod tests {
         let range = format!(
             "{}\n{} to {} {}, at start {}",
             row.description.trim(),
-            short(row.min),
-            short(row.max),
+            number(row.min.into()),
+            number(row.max.into()),
             row.unit,
-            short(row.default)
+            number(row.default.into())
         );
         vec![words(row.name), range]
     }
@@ -330,20 +312,6 @@ mod tests {
     fn names_read_as_words() {
         assert_eq!(words("CouplingAngularDamping"), "Coupling angular damping");
         assert_eq!(words("ForceLimit"), "Force limit");
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        for (value, text) in [
-            (1_000.0, "1000"),
-            (0.5, "0.5"),
-            (0.0005, "0.0005"),
-            (8.0, "8"),
-            (12.25, "12.2"),
-            (0.0, "0"),
-        ] {
-            assert_eq!(short(value), text);
-        }
     }
 
     #[test]

@@ -15,16 +15,11 @@ use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
 use mortise_protocol::parameter::ParameterId;
 
-use crate::common::{arm, click, connect, harness, open_sample, poses, until};
+use crate::common::{arm, begin_recording, click, connect, harness, open_sample, poses, until};
 
 /// Records while the hand presses the peg of the sample beside its hole, after so long; returns the file.
 fn record_touch(harness: &mut Harness<'_, Window>, wait_s: f64) -> PathBuf {
-    click(harness, "Record");
-    until(harness, "the recording", |s| s.recording.is_some());
-    let path = (harness.state().session.recording.as_ref())
-        .expect("just seen")
-        .path
-        .clone();
+    let path = begin_recording(harness);
     click(harness, "Reset parts");
     arm(harness);
     harness.state_mut().session.act(Intent::Grab(1));

@@ -160,12 +160,19 @@ pub fn holding() -> Harness<'static, Window> {
     harness
 }
 
+/// Begins a recording with the collision model on the board; returns its file.
+pub fn begin_recording(harness: &mut Harness<'_, Window>) -> PathBuf {
+    click(harness, "Record");
+    until(harness, "the recording", |s| {
+        s.recording.is_some() && s.scene_is_on_board()
+    });
+    let recording = harness.state().session.recording.as_ref();
+    recording.expect("just seen").path.clone()
+}
+
 /// Records while the simulated hand inserts the peg of the sample, which must be on the board; returns the file.
 pub fn record_insertion(harness: &mut Harness<'_, Window>) -> PathBuf {
-    click(harness, "Record");
-    until(harness, "the recording", |s| s.recording.is_some());
-    let recording = harness.state().session.recording.as_ref();
-    let path = recording.expect("just seen").path.clone();
+    let path = begin_recording(harness);
     click(harness, "Reset parts");
     arm(harness);
     click(harness, "peg");

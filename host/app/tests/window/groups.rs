@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::common::{arm, click, connect, harness, harness_on, picture, poses, until};
+use crate::common::{arm, begin_recording, click, connect, harness, harness_on, picture, poses, until};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
@@ -423,14 +423,7 @@ fn a_recorded_group_is_played_as_one() {
     harness.state_mut().session.recordings = Some(data.path().to_owned());
     let before = poses(&harness);
     connect(&mut harness);
-    click(&mut harness, "Record");
-    until(&mut harness, "the recording", |s| {
-        s.recording.is_some() && s.scene_is_on_board()
-    });
-    let path = (harness.state().session.recording.as_ref())
-        .expect("just seen")
-        .path
-        .clone();
+    let path = begin_recording(&mut harness);
     arm(&mut harness);
     harness.state_mut().session.act(Intent::Grab(1));
     until(&mut harness, "the group is held", |s| s.is_held(2));

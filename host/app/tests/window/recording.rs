@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::common::{arm, click, connect, harness, open_sample, poses, record_insertion, until};
+use crate::common::{
+    arm, begin_recording, click, connect, harness, open_sample, poses, record_insertion, until,
+};
 use glam::{DAffine3, DVec3};
 use mortise::session::insertion::hold;
 use mortise::session::link::Link;
@@ -73,14 +75,7 @@ fn a_recording_of_moved_parts_replays() {
     until(&mut harness, "the part is placed", Session::scene_is_on_board);
     assert_ne!(poses(&harness), before);
     let there = poses(&harness)[1];
-    click(&mut harness, "Record");
-    until(&mut harness, "the recording", |s| {
-        s.recording.is_some() && s.scene_is_on_board()
-    });
-    let path = (harness.state().session.recording.as_ref())
-        .expect("just seen")
-        .path
-        .clone();
+    let path = begin_recording(&mut harness);
     arm(&mut harness);
     harness.state_mut().session.act(Intent::Grab(1));
     until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
