@@ -232,3 +232,48 @@ fn a_run_is_computed_again_to_the_same_bits_and_another_parameter_changes_a_tick
     });
     assert!(!is_computing(&harness.state().session));
 }
+
+/// Once the run that moved the parts is closed they are the operator's, also while another run is shown.
+#[test]
+fn parts_that_no_run_moves_any_more_stay_where_they_are_put() {
+    let data = tempfile::tempdir().expect("a folder");
+    let mut harness = harness();
+    harness.state_mut().session.recordings = Some(data.path().to_owned());
+    open_sample(&mut harness);
+    let paths = [0, 1].map(|number| {
+        if number == 1 {
+            // Another collision model of the same file.
+            harness.state_mut().session.act(Intent::Lock(0, false));
+            until(&mut harness, "it is baked again", |s| {
+                s.document
+                    .as_ref()
+                    .is_some_and(|document| document.baked.is_some())
+            });
+        }
+        connect(&mut harness);
+        let path = record_touch(&mut harness, 0.1);
+        harness.state_mut().session.act(Intent::Select(None));
+        click(&mut harness, "Disconnect");
+        until(&mut harness, "disconnected", |s| matches!(s.link, Link::None));
+        path
+    });
+    act(&mut harness, RunIntent::Open(paths[0].clone()));
+    until(&mut harness, "the run is read", |s| s.playback.is_some());
+    assert!(!harness.state().session.replays(), "it has another model");
+    act(&mut harness, RunIntent::Compare(paths[1].clone()));
+    until(&mut harness, "the other run", |s| shown(s).runs().len() == 2);
+    assert!(harness.state().session.replays());
+    act(&mut harness, RunIntent::Remove(1));
+    assert!(!harness.state().session.replays());
+    harness.state_mut().session.act(Intent::Select(Some(1)));
+    harness.run_steps(2);
+    let before = poses(&harness);
+    harness.key_press(egui::Key::PageUp);
+    harness.run_steps(2);
+    let moved = poses(&harness);
+    assert_ne!(moved, before);
+    act(&mut harness, RunIntent::GoTo(0.2));
+    assert_eq!(poses(&harness), moved);
+    act(&mut harness, RunIntent::Close);
+    assert_eq!(poses(&harness), moved);
+}
