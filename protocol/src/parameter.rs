@@ -89,12 +89,14 @@ parameters! {
     PointBudget = "look-ups", 16.0, 65_535.0, 520.0;
     /// Integration of the object's motion; explicit is the textbook's, which trembles on stiff contact.
     Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];
-    /// Guidance by constraint targets: none, stiff with limited force, or the softer blend of the thesis.
-    Guidance = "choice", 0.0, 2.0, 1.0, ["off", "force-limited", "Faas 2010"];
+    /// Guidance: none; by constraint targets, stiff with limited force or the softer blend of the thesis; or by the scene's geometric energies.
+    Guidance = "choice", 0.0, 3.0, 1.0, ["off", "force-limited", "Faas 2010", "geometric energy"];
     /// Whether mating faces that an engaged target keeps apart are excluded from contact. The forces are the same; for comparing tick costs.
     Joints = "choice", 0.0, 1.0, 1.0, ["off", "on"];
     /// Distance by which points of the held part are moved inward for voxmap queries; the textbook's pointshell shrinking, for comparison.
     Shrinking = "voxels", 0.0, 1.0, 0.0;
+    /// Largest force of a geometric energy.
+    GeometricForce = "N", 0.0, 10.0, 3.0;
 }
 
 impl ParameterId {

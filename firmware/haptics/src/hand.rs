@@ -6,6 +6,7 @@ use crate::collision::coherence::Coherence;
 use crate::collision::contact::Contacts;
 use crate::collision::decimation::Decimation;
 use crate::collision::node_cursor::NodeCursor;
+use crate::constraints::geometric_energy::GeometricEnergy;
 use crate::constraints::targets::TargetSet;
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::limits::limit;
@@ -31,6 +32,8 @@ pub(crate) struct Hand {
     pub tank: EnergyTank,
     /// Constraint targets.
     pub targets: TargetSet,
+    /// Geometric energies.
+    pub energy: GeometricEnergy,
     pub contact: ContactMemory,
 }
 
@@ -65,6 +68,7 @@ impl Hand {
             previous_wrench: Wrench::ZERO,
             tank: EnergyTank::new(),
             targets: TargetSet::new(),
+            energy: GeometricEnergy::new(),
             contact: ContactMemory::new(),
         }
     }
@@ -73,6 +77,7 @@ impl Hand {
     pub fn invalidate(&mut self) {
         self.tank.forget();
         self.targets.clear_all();
+        self.energy.clear();
         self.contact.invalidate();
     }
 

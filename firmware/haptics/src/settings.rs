@@ -153,6 +153,8 @@ settings_group! {
         time_s: f32 = 20e-3, 1e-3 => 1.0;
         /// Whether mating faces that an engaged target keeps apart are excluded from contact: the forces are the same.
         exclusions: bool <- Joints;
+        /// Largest force of a geometric energy, N: its depth in joules follows from it.
+        geometric_force_n: f32 <- GeometricForce, 0.0 => 10.0;
     }
 }
 
@@ -165,6 +167,8 @@ pub enum GuidanceMethod {
     Capped,
     /// The blend of Faas 2010, for comparison.
     Thesis,
+    /// The geometric energies of the scene, without targets (Behandish & Ilieş 2015); see `constraints::geometric_energy` in the sources.
+    Energy,
 }
 
 impl FromParameter for GuidanceMethod {
@@ -173,8 +177,10 @@ impl FromParameter for GuidanceMethod {
             Self::Off
         } else if value < 1.5 {
             Self::Capped
-        } else {
+        } else if value < 2.5 {
             Self::Thesis
+        } else {
+            Self::Energy
         }
     }
 }
@@ -309,6 +315,7 @@ mod tests {
             (0.6, GuidanceMethod::Capped),
             (1.4, GuidanceMethod::Capped),
             (1.6, GuidanceMethod::Thesis),
+            (2.6, GuidanceMethod::Energy),
         ] {
             assert_eq!(GuidanceMethod::from_parameter(value), method);
         }

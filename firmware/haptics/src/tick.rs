@@ -6,7 +6,8 @@ use mortise_protocol::image::SceneImage;
 use crate::baseline::explicit;
 use crate::collision::contact::Phase;
 use crate::collision::face_pairs::{Scenery, touching_faces};
-use crate::constraints::saturating_spring::TargetForce;
+use crate::constraints::geometric_energy::{EnergyForce, EnergySituation};
+use crate::constraints::saturating_spring::{SaturatingSpring, TargetForce};
 use crate::constraints::targets::{Situation, TargetRules};
 use crate::contact_step::{Constraints, Given, Reach, contact_step};
 use crate::dynamics::body::Grabbed;
@@ -17,7 +18,7 @@ use crate::dynamics::step::{Solution, Step};
 use crate::hand::Hand;
 use crate::io::{Flags, GuidanceState, Input, Output, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose, usable_twist};
-use crate::math::scalar::smaller;
+use crate::math::scalar::{larger, smaller};
 use crate::motion::{point_speed, slow_down};
 use crate::passivity::energy_bound::Hold;
 use crate::settings::{Integrator, Settings};
@@ -92,7 +93,8 @@ fn couple(hand: &mut Hand, grabbed: Grabbed, handle: Pose, input: &Input, settin
         tank.measure(&mut coupling, handle.orientation);
         let last = hand.previous_wrench;
         let open = tank.balance(handle, input.handle_twist, &coupling, last, moving_j, settings);
-        let hold = match (hand.targets.is_empty(), hand.contact.pushing) {
+        let unguided = hand.targets.is_empty() && hand.energy.engagement() == 0.0;
+        let hold = match (unguided, hand.contact.pushing) {
             (false, _) => Hold::Targets,
             (true, 0) => Hold::Nothing,
             (true, _) => Hold::Contacts,
@@ -145,10 +147,17 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     let turning_j = grabbed.turning_energy(step.mass_kg, step.gyration2);
     hand.tank
         .keep(coupled.moving_j + turning_j, settings.passivity.initial_budget_j);
-    let constrained = (
-        CouplingForce::new(coupling, &settings.coupling, period_s, length),
-        TargetForce::new(&springs, period_s, length),
-    );
+    let energy = EnergySituation {
+        scene: given.scene,
+        parts: given.parts,
+        grabbed: &grabbed,
+        period_s,
+        length,
+    };
+    let energy = hand.energy.step(&energy, &settings.guidance);
+    let guided = (TargetForce::new(&springs, period_s, length), energy);
+    let coupled_force = CouplingForce::new(coupling, &settings.coupling, period_s, length);
+    let constrained = (coupled_force, guided);
     let terms = &mut (constrained, Friction::new(&settings.friction, period_s, length));
 
     let (free, reach) = free_motion(given, &grabbed, &step, terms);
@@ -185,8 +194,24 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     finite.then(|| Moved {
         grabbed,
         contact: solution.contact,
-        guidance: hand.targets.state(&springs, &step.scale(twist), length),
+        guidance: guidance(hand, &springs, energy, &step.scale(twist), &step),
     })
+}
+
+/// What guides, for telemetry: targets and geometric energies together, once the twist `x` has acted.
+fn guidance(
+    hand: &Hand,
+    springs: &[SaturatingSpring],
+    energy: Option<EnergyForce>,
+    x: &[f32; 6],
+    step: &Step,
+) -> GuidanceState {
+    let mut state = hand.targets.state(springs, x, step.length);
+    if let Some(energy) = energy {
+        state.wrench = state.wrench + energy.wrench(x, step.period_s);
+        state.engagement = larger(state.engagement, hand.energy.engagement());
+    }
+    state
 }
 
 /// Situation of the constraints at the tick's start.

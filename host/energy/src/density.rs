@@ -116,6 +116,19 @@ impl Density {
             })
     }
 
+    /// Centre of mass of the solid, mm.
+    pub fn center_of_mass(&self) -> DVec3 {
+        self.surface.shape().center_of_mass
+    }
+
+    /// ρ(p) less the density beside a plane on that side of the surface: zero there, at any distance.
+    pub fn without_planes(&self, p: DVec3) -> Complex<f64> {
+        match self.surface.nearest(p) {
+            Some(nearest) => self.at(p) - self.beside[usize::from(nearest.distance > 0.0)],
+            None => Complex::ZERO,
+        }
+    }
+
     /// ρ(p), eq. 3; zero for a shape without triangles. Cost: some thousand parts of triangles, about 0.1 ms.
     pub fn at(&self, p: DVec3) -> Complex<f64> {
         let Some(nearest) = self.surface.nearest(p) else {

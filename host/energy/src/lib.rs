@@ -10,10 +10,16 @@
 //!
 //! Units: millimetres, radians; energy in the unit of the scale that the caller gives.
 
+mod attach;
+mod baked;
 pub mod density;
 pub mod field;
+mod of_fit;
 pub mod pair;
 
+pub use attach::{AttachError, Placed, attach, bytes};
+pub use baked::{BakedEnergy, Cost, Way, bake};
 pub use density::{Density, Kernel};
 pub use field::Field;
+pub use of_fit::of_fit;
 pub use pair::{Felt, Pair, Sample};

@@ -5,10 +5,12 @@ use std::path::Path;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_bake::{Grabbable, Request};
 use mortise_brep::{CadModel, LoadOptions, load_step_with};
+use mortise_energy::{BakedEnergy, Placed, attach, of_fit};
 use mortise_fit::{Fit, FitOptions, find, part_named};
 use mortise_guide::{GuideSettings, along};
 use mortise_mating::recognise::Target;
 use mortise_protocol::message::Telemetry;
+use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 use mortise_scenario::wire::pose_mm;
 use mortise_scenario::{PreparedScene, Recording, Scenario, connect, overlap, record};
@@ -48,13 +50,21 @@ pub(crate) enum Help {
     Nothing,
     /// The way in, held.
     Way,
+    /// The scene's geometric energy alone.
+    Energy,
 }
+
+/// Value of [`ParameterId::Guidance`] for the geometric energy.
+const BY_ENERGY: f32 = 3.0;
 
 /// A pair, its fit, and the scene in which the moving part begins outside.
 pub(crate) struct Followed {
     scenario: Scenario,
     scene: PreparedScene,
     target: Target,
+    /// The fit, and the parts of the model that it is of.
+    fit: Fit,
+    parts: [usize; 2],
     /// Placements of the moving part at the start and in the fit, and of the other part, mm.
     start: DAffine3,
     other: DAffine3,
@@ -145,6 +155,8 @@ impl Followed {
             scenario,
             scene,
             target,
+            fit: fit.clone(),
+            parts: [a, b],
             start,
             other,
             way,
@@ -152,9 +164,40 @@ impl Followed {
         })
     }
 
+    /// The pair with its geometric energy in the scene, and that energy.
+    pub fn with_energy(mut self) -> Result<(Self, BakedEnergy), LabError> {
+        let bad = |what: &str| LabError::Input {
+            name: self.scenario.name.clone(),
+            what: what.to_owned(),
+        };
+        let [moving, fixed] = self.parts;
+        let energy = of_fit(&self.scene.model, moving, fixed, &self.fit)
+            .ok_or_else(|| bad("the fit has no energy"))?;
+        let baked = self
+            .scene
+            .report
+            .parts
+            .iter()
+            .position(|part| part.model_part == fixed);
+        let fixed = (baked.and_then(|index| u16::try_from(index).ok()))
+            .ok_or_else(|| bad("the part is not in the scene"))?;
+        let placed = Placed {
+            moving: self.scene.part,
+            fixed,
+            energy,
+        };
+        self.scene.image = attach(&self.scene.image, std::slice::from_ref(&placed))
+            .map_err(|error| bad(&error.to_string()))?;
+        Ok((self, placed.energy))
+    }
+
     /// Inserts the part.
     pub fn insert(&self, off: &Off, help: Help, rig: &RigSpec) -> Result<Seen, LabError> {
-        let scenario = self.scenario(off);
+        let mut scenario = self.scenario(off);
+        if help == Help::Energy {
+            let name = ParameterId::Guidance.row().name;
+            scenario.parameters.insert(name.to_owned(), BY_ENERGY);
+        }
         let settings = GuideSettings {
             recognising: false,
             ..GuideSettings::default()

@@ -4,6 +4,7 @@ use bytemuck::{Pod, try_cast_slice};
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 use super::edge::{EdgeRecord, NO_SPAN, SpanRecord};
+use super::energy::{ChargeRecord, Energy, EnergyBlock, EnergyRecord};
 use super::error::ImageError;
 use super::field::Field;
 use super::nearby::{Group, Nearby};
@@ -27,6 +28,9 @@ const SECTION_GRID: u8 = 9;
 const SECTION_BLOB: u8 = 10;
 const SECTION_EDGES: u8 = 11;
 const SECTION_SPANS: u8 = 12;
+const SECTION_ENERGIES: u8 = 13;
+const SECTION_CHARGES: u8 = 14;
+const SECTION_ENERGY_NODES: u8 = 15;
 
 /// A scene image, read in place.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +49,9 @@ pub struct SceneImage<'a> {
     blob: &'a [u8],
     edges: &'a [EdgeRecord],
     spans: &'a [SpanRecord],
+    energies: &'a [EnergyRecord],
+    charges: &'a [ChargeRecord],
+    energy_nodes: &'a [[i8; 2]],
 }
 
 /// One shape of an image with its arrays.
@@ -115,6 +122,7 @@ impl<'a> SceneImage<'a> {
                 found,
             });
         }
+        let block = energy_block(bytes, header)?;
         let image = Self {
             header,
             parts: section(bytes, header.parts, SECTION_PARTS)?,
@@ -130,6 +138,9 @@ impl<'a> SceneImage<'a> {
             blob: section(bytes, header.blob, SECTION_BLOB)?,
             edges: section(bytes, header.edges, SECTION_EDGES)?,
             spans: section(bytes, header.spans, SECTION_SPANS)?,
+            energies: section(bytes, block.energies, SECTION_ENERGIES)?,
+            charges: section(bytes, block.charges, SECTION_CHARGES)?,
+            energy_nodes: section(bytes, block.nodes, SECTION_ENERGY_NODES)?,
         };
         image.check()?;
         Ok(image)
@@ -189,6 +200,21 @@ impl<'a> SceneImage<'a> {
             faces: run(self.faces, record.first_face, record.face_count),
             patches: run(self.patches, record.first_patch, record.patch_count),
         }
+    }
+
+    /// Number of geometric energies.
+    pub fn energy_count(&self) -> usize {
+        self.energies.len()
+    }
+
+    /// Geometric energy `index`; `None` when there is no such one.
+    pub fn energy(&self, index: usize) -> Option<Energy<'a>> {
+        let record = self.energies.get(index)?;
+        Some(Energy {
+            record,
+            charges: run(self.charges, record.first_charge, record.charge_count),
+            nodes: &self.energy_nodes[record.first_node as usize..][..record.node_count() as usize],
+        })
     }
 
     fn check(&self) -> Result<(), ImageError> {
@@ -299,11 +325,28 @@ impl<'a> SceneImage<'a> {
         each(self.spans, SECTION_SPANS, |span| {
             finite(&span.along) && finite(&span.bend) && (0.0..=1.0).contains(&span.round)
         })?;
+        self.check_energies()?;
         each(self.faces, SECTION_FACES, |face| {
             face.kind <= surface_kind::TORUS
                 && finite(&face.origin)
                 && finite(&face.axis)
                 && finite(&[face.sense, face.radius, face.second])
+        })
+    }
+
+    fn check_energies(&self) -> Result<(), ImageError> {
+        let parts = self.parts.len();
+        each(self.energies, SECTION_ENERGIES, |energy| {
+            usize::from(energy.moving) < parts
+                && usize::from(energy.fixed) < parts
+                && energy.moving != energy.fixed
+                && energy.is_usable()
+                && fits(energy.first_charge, energy.charge_count, self.charges.len())
+                && u32::try_from(energy.node_count())
+                    .is_ok_and(|n| fits(energy.first_node, n, self.energy_nodes.len()))
+        })?;
+        each(self.charges, SECTION_CHARGES, |charge| {
+            finite(&charge.at) && finite(&charge.charge)
         })
     }
 
@@ -416,6 +459,29 @@ fn brick_bytes(format: u16) -> Option<usize> {
 
 fn grid_len(field: &FieldRecord) -> u64 {
     field.brick_dims.iter().map(|&d| u64::from(d)).product()
+}
+
+/// Where the energies are; empty sections for an image without them.
+fn energy_block(bytes: &[u8], header: &Header) -> Result<EnergyBlock, ImageError> {
+    if header.energies == 0 {
+        let nothing = Section {
+            offset: size_of::<Header>() as u32,
+            count: 0,
+        };
+        return Ok(EnergyBlock {
+            energies: nothing,
+            charges: nothing,
+            nodes: nothing,
+        });
+    }
+    let at = Section {
+        offset: header.energies,
+        count: 1,
+    };
+    let blocks: &[EnergyBlock] = section(bytes, at, SECTION_ENERGIES)?;
+    (blocks.first().copied()).ok_or(ImageError::Section {
+        section: SECTION_ENERGIES,
+    })
 }
 
 fn section<T: Pod>(bytes: &[u8], section: Section, number: u8) -> Result<&[T], ImageError> {

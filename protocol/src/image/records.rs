@@ -39,8 +39,8 @@ pub struct Header {
     pub length: u32,
     /// CRC-32/ISO-HDLC over bytes `20..length` (all that follows this field).
     pub crc: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Byte offset of the [`super::EnergyBlock`], a multiple of 4; 0: no energies. A reader that does not know it passes over them.
+    pub energies: u32,
     /// [`PartRecord`]s.
     pub parts: Section,
     /// [`ShapeRecord`]s.

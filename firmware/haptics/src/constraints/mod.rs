@@ -2,5 +2,6 @@
 
 mod alignment;
 mod fit;
+pub(crate) mod geometric_energy;
 pub(crate) mod saturating_spring;
 pub(crate) mod targets;

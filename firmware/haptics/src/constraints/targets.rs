@@ -166,7 +166,8 @@ impl TargetSet {
         if self.method != settings.method && self.slots.iter().all(|slot| slot.engagement == 0.0) {
             self.method = settings.method;
         }
-        let on = self.method == settings.method && self.method != GuidanceMethod::Off;
+        let guides = matches!(self.method, GuidanceMethod::Capped | GuidanceMethod::Thesis);
+        let on = self.method == settings.method && guides;
         let mut changing = 0u8;
         for slot in &mut self.slots {
             slot.left = slot.left.saturating_sub(1);
@@ -206,7 +207,7 @@ impl TargetSet {
                     };
                     (law(target.force_cap), law(target.torque_cap))
                 }
-                GuidanceMethod::Off | GuidanceMethod::Capped => {
+                GuidanceMethod::Off | GuidanceMethod::Energy | GuidanceMethod::Capped => {
                     let law = |cap: f32, a: f32, times: f32| Law::Capped {
                         stiffness: times * target.stiffness * (a * a * a * a).max(MIN_STIFFNESS_SHARE),
                         cap: cap * a,

@@ -79,7 +79,10 @@ const LAYERS: &[(&str, &[&str])] = &[
         "host/task",
         &["mortise-bake", "mortise-brep", "mortise-mating", "mortise-shapes"],
     ),
-    ("host/energy", &["mortise-bake", "mortise-brep"]),
+    (
+        "host/energy",
+        &["mortise-bake", "mortise-brep", "mortise-fit", "mortise-protocol"],
+    ),
     ("host/shapes", &[]),
     ("host/flash", &["mortise-protocol"]),
     (

@@ -128,7 +128,7 @@ pub(super) fn starts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), La
         };
         let inserted = seen.iter().filter(|seen| seen.is_in).count() as f64;
         match help {
-            Help::Nothing => out(Row::reported(what("inserted"), inserted, "starts")),
+            Help::Nothing | Help::Energy => out(Row::reported(what("inserted"), inserted, "starts")),
             Help::Way => out(Row::exactly(what("inserted"), inserted, "starts", count as f64)),
         }
         let mut times: Vec<f64> = seen
