@@ -5,7 +5,7 @@
 //! * **Without planes.** The density beside a plane, which does not fade with the distance, is subtracted on either side: flat faces no longer draw each other.
 //! * **Strongest places.** Of the places in and around the moving part those with the largest density are kept, near the faces that mate.
 //! * **Fitted charges.** The energy is linear in the charges at these places. Instead of the densities there, they are those of least size (ridge regression)
-//!   with which on the way of the fit the gradient across it vanishes, the energy falls evenly from zero, where the way begins in the open, to its depth at the
+//!   with which displacements to either side of the way cost the same, the energy falls evenly from zero, where the way begins in the open, to its depth at the
 //!   fit, and beside the way rises as 1 − 1/√(1 + (d/r)² + (φ·L/r)²), L the extent of where it acts. The way comes from exact surfaces: they place the
 //!   minimum, the density gives the functions of which the well is made. Densities as charges, as published, contribute nothing to such a well: what they
 //!   are scaled by in the best fit is zero for most pairs.
@@ -23,8 +23,8 @@ use crate::density::Density;
 /// Charges of an energy, and nodes of its lattice at most: together 31.9 KiB.
 const CHARGES: usize = 384;
 const NODES: usize = 12_400;
-/// Places at which the moving part's density is looked at for its charges, about.
-const PLACES: f64 = 6000.0;
+/// Places at which the moving part's density is looked at for its charges, about: several sets, of which one is kept.
+const PLACES: [f64; 4] = [6000.0, 5000.0, 4000.0, 3000.0];
 /// Margin about the moving part in which it has charges, mm.
 const MARGIN_MM: f64 = 4.0;
 /// How far from the mating faces it has charges, mm.
@@ -40,21 +40,33 @@ const WIDTH_MM: f64 = 1.5;
 /// Largest displacement beside the way for which the energy is fitted, mm, and the rotation, as a displacement at the distance L.
 const ASIDE_MM: f64 = 5.0;
 const TURNED_MM: f64 = 3.0;
+/// Share of spin about the way in it: of round parts it changes nothing.
+const SPIN_SHARE: f64 = 0.3;
 /// Poses beside the way at each of its places, and the steps from one place to the next, mm.
 const BESIDE: usize = 40;
 const PLACE_STEP_MM: f64 = 0.53;
-/// Weights of the fit: gradients across the way and of rotation, on the way and times r; energy on the way; energy beside it; and of the charges' changes.
-/// With these the minimum is least off the fit over the three sections of `mortise-lab energy`.
+/// Displacements along each axis at which the energy is fitted most closely, over r; in rotation over r/L.
+const CLOSE: [f64; 2] = [0.25, 0.6];
+/// Weights of the fit: that close displacements to either side cost the same, across the way, in tilt and in spin
+/// about the way; what they cost, over that; the energy on the way
+/// and farther beside it; and the size of the charges, over the mean of all weights.
 const ACROSS_WEIGHT: f64 = 20.0;
 const TURNED_WEIGHT: f64 = 40.0;
+const SPUN_WEIGHT: f64 = 10.0;
+const RISE_SHARE: f64 = 0.3;
 const ON_WAY_WEIGHT: f64 = 1.0;
 const BESIDE_WEIGHT: f64 = 0.2;
 const RIDGE: f64 = 1e-3;
+/// Arm at which tilts count as displacements, mm, and the first step of the search for a minimum, mm.
+const TILT_ARM_MM: f64 = 10.0;
+const SEARCH_MM: f64 = 0.5;
 /// Poses at which the stiffness is sampled, the largest displacement from each, mm, and rotation, rad; and the excess that is none, over the depth.
 const STIFFNESS_POSES: usize = 3000;
 const STIFFNESS_MM: f64 = 0.8;
 const STIFFNESS_RAD: f64 = 0.03;
 const STIFFNESS_SLACK: f64 = 1e-4;
+/// Largest factor on stiffness for displacements and rotations at once.
+const MOST_COUPLED: f64 = 3.0;
 
 /// Lengths in the image are in metres.
 const M_PER_MM: f64 = 1e-3;
@@ -94,6 +106,47 @@ pub struct Cost {
 }
 
 impl BakedEnergy {
+    /// Middle of the charges, moving part's frame, mm.
+    pub fn middle(&self) -> DVec3 {
+        let places = self
+            .charges
+            .iter()
+            .map(|charge| DVec3::from_array(charge.at.map(f64::from)));
+        places.sum::<DVec3>() / (M_PER_MM * self.charges.len().max(1) as f64)
+    }
+
+    /// Distance across the way (mm) and tilt (rad) of the least energy near a pose, which stays where it is along the way and in spin about it; by steps along the
+    /// coordinates, from [`SEARCH_MM`] down to a micrometre.
+    pub fn minimum(&self, pose: &DAffine3) -> (f64, f64) {
+        let axis = DVec3::from_array(self.record.way.map(f64::from));
+        let (u, v) = axis.any_orthonormal_pair();
+        let middle = pose.transform_point3(self.middle());
+        let of = |x: &[f64; 4]| {
+            let turn = (u * x[2] + v * x[3]) / TILT_ARM_MM;
+            let pose = moved(pose, u * x[0] + v * x[1], turn, middle);
+            self.at(&pose, DVec3::ZERO).energy
+        };
+        let (mut at, mut step) = ([0.0; 4], SEARCH_MM);
+        let mut value = of(&at);
+        while step > 1e-3 {
+            let before = value;
+            for k in 0..4 {
+                for sign in [step, -step] {
+                    let mut next = at;
+                    next[k] += sign;
+                    let there = of(&next);
+                    if there < value {
+                        (at, value) = (next, there);
+                    }
+                }
+            }
+            if value == before {
+                step *= 0.5;
+            }
+        }
+        (at[0].hypot(at[1]), at[2].hypot(at[3]) / TILT_ARM_MM)
+    }
+
     /// Energy as the board computes it, before its sums; `about` is the point in the fixed part's frame (mm) that rotations are about.
     pub fn at(&self, pose: &DAffine3, about: DVec3) -> Cost {
         let Some(energy) = Energy::new(&self.record, &self.charges, &self.nodes) else {
@@ -123,32 +176,57 @@ fn look(energy: &Energy<'_>, pose: &DAffine3, at: DVec3, charge: [f32; 2]) -> Op
     Some((place, f64::from(value), slope))
 }
 
-/// Makes the energy of a moving part in a fixed one's density along a way. `None` where the two have no density for each other: the lattice stays empty.
+/// Makes the energy of a moving part in a fixed one's density along a way. `None` where the two have no density for each other.
 ///
-/// Cost: about 5 s on two cores, most of it densities.
+/// Where a minimum is, a few hundred places leave to chance: of several sets the one is kept whose minima are least off the way. Cost: about 8 s on two
+/// cores, most of it densities.
 pub fn bake(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEnergy> {
-    let samples = strongest(moving, way.mating);
-    let (record, nodes) = lattice(fixed, &samples, way)?;
-    let mut baked = BakedEnergy {
-        record,
-        charges: Vec::new(),
-        nodes,
-        deviation: 0.0,
+    let zone = zone(moving, way.mating);
+    let (record, nodes) = lattice(fixed, zone, way)?;
+    let of = |places: f64| {
+        let samples = strongest(moving, zone, places);
+        let mut baked = BakedEnergy {
+            record,
+            charges: Vec::new(),
+            nodes: nodes.clone(),
+            deviation: 0.0,
+        };
+        fit(&mut baked, &samples, way)?;
+        Some((off_way(&baked, way), baked))
     };
-    fit(&mut baked, &samples, way)?;
-    majorise(&mut baked, way, moving.center_of_mass());
-    Some(baked)
+    let all: Vec<(f64, BakedEnergy)> = PLACES.into_iter().filter_map(of).collect();
+    let (_, mut best) = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    majorise(&mut best, way, moving.center_of_mass());
+    Some(best)
+}
+
+/// Largest distance of the least energy from the way over places on it, mm; tilts count as displacements at [`TILT_ARM_MM`].
+fn off_way(baked: &BakedEnergy, way: &Way<'_>) -> f64 {
+    let before = [0.0, 0.25, 0.5, 0.75].map(|share| share * way.length_mm);
+    let above = [1.0, 2.0, 5.0].map(|height| way.length_mm + height);
+    (before.into_par_iter().chain(above))
+        .map(|travel| {
+            let (aside, tilt) = baked.minimum(&(way.pose)(travel));
+            aside.max(TILT_ARM_MM * tilt)
+        })
+        .reduce(|| 0.0, f64::max)
 }
 
 /// A place of the moving part and its density there, less that beside a plane.
 type Sample = (DVec3, Complex<f64>);
 
-fn strongest(moving: &Density, [low, high]: [DVec3; 2]) -> Vec<Sample> {
+/// Corners of the box in which the moving part has charges, its frame, mm.
+fn zone(moving: &Density, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
     let [least, most] = moving.extent();
-    let (low, high) = (low - ABOUT_MM, high + ABOUT_MM);
-    let (low, high) = (low.max(least - MARGIN_MM), high.min(most + MARGIN_MM));
+    [
+        (low - ABOUT_MM).max(least - MARGIN_MM),
+        (high + ABOUT_MM).min(most + MARGIN_MM),
+    ]
+}
+
+fn strongest(moving: &Density, [low, high]: [DVec3; 2], places: f64) -> Vec<Sample> {
     let (middle, half) = (low.midpoint(high), 0.5 * (high - low));
-    let step = ((high - low).element_product() / PLACES).cbrt();
+    let step = ((high - low).element_product() / places).cbrt();
     let turned = DMat3::from_axis_angle(TURN_ABOUT.normalize(), TURN_RAD);
     let nodes = (half.length() / step).ceil() as i64;
     let places: Vec<DVec3> = (-nodes..=nodes)
@@ -175,13 +253,14 @@ fn travels(way: &Way<'_>) -> Vec<f64> {
     (0..=count).map(|i| last * i as f64 / count as f64).collect()
 }
 
-/// Lattice of the fixed part's density over all that the charges pass.
-fn lattice(fixed: &Density, samples: &[Sample], way: &Way<'_>) -> Option<(EnergyRecord, Vec<[i8; 2]>)> {
+/// Lattice of the fixed part's density over all that the zone of the charges passes.
+fn lattice(fixed: &Density, zone: [DVec3; 2], way: &Way<'_>) -> Option<(EnergyRecord, Vec<[i8; 2]>)> {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for travel in travels(way) {
         let pose = (way.pose)(travel);
-        for (at, _) in samples {
-            let place = pose.transform_point3(*at);
+        for corner in 0..8 {
+            let [x, y, z] = [0, 1, 2].map(|axis| zone[corner >> axis & 1][axis]);
+            let place = pose.transform_point3(DVec3::new(x, y, z));
             (low, high) = (low.min(place), high.max(place));
         }
     }
@@ -267,77 +346,98 @@ fn moved(pose: &DAffine3, by: DVec3, turn: DVec3, about: DVec3) -> DAffine3 {
         * *pose
 }
 
-/// Terms of an energy of unit charges at a pose: energy and its six derivatives, for the real and the imaginary part of each charge.
-fn terms(energy: &Energy<'_>, samples: &[Sample], pose: &DAffine3, about: DVec3) -> Vec<[f64; 7]> {
-    let of = |at: DVec3, charge: [f32; 2]| {
-        look(energy, pose, at, charge).map_or([0.0; 7], |(place, value, slope)| {
-            let turn = (place - about).cross(slope);
-            [value, slope.x, slope.y, slope.z, turn.x, turn.y, turn.z].map(|v| -v)
-        })
-    };
-    let parts = [[1.0, 0.0], [0.0, 1.0]];
+/// Energy of unit charges at a pose, for the real and the imaginary part of each.
+fn terms(energy: &Energy<'_>, samples: &[Sample], pose: &DAffine3) -> Vec<f64> {
+    let of = |at: DVec3, charge: [f32; 2]| look(energy, pose, at, charge).map_or(0.0, |(_, value, _)| -value);
     (samples.iter())
-        .flat_map(|(at, _)| parts.map(|charge| of(*at, charge)))
+        .flat_map(|(at, _)| [[1.0, 0.0], [0.0, 1.0]].map(|charge| of(*at, charge)))
         .collect()
 }
 
-/// Fits the charges.
+/// A wanted energy, linear in the charges: coefficients of their real and imaginary parts, its value, and the weight of both.
+struct Row {
+    terms: Vec<f64>,
+    value: f64,
+    weight: f64,
+}
+
+/// Rows of one place of the way: [`ON_WAY_ROWS`] close to the way, then [`BESIDE`] beside it.
+const ON_WAY_ROWS: usize = 1 + 5 * 2 * CLOSE.len();
+
+/// 1 − 1/√(1 + x²): the rise beside the way at x times r.
+fn rise(x: f64) -> f64 {
+    1.0 - 1.0 / (1.0 + x * x).sqrt()
+}
+
+fn rows(energy: &Energy<'_>, samples: &[Sample], way: &Way<'_>, number: usize, travel: f64) -> Vec<Row> {
+    let axis = DVec3::from_array(energy.record.way.map(f64::from));
+    let (u, v) = axis.any_orthonormal_pair();
+    let pose = (way.pose)(travel);
+    let on_way = terms(energy, samples, &pose);
+    let (middle, length) = extent(samples, &on_way, &pose);
+    let height = ((way.length_mm + BEYOND_MM - travel) / (way.length_mm + BEYOND_MM)).max(0.0);
+    let off = |by: DVec3, turn: DVec3| terms(energy, samples, &moved(&pose, by, turn, middle));
+    let mut rows = Vec::with_capacity(ON_WAY_ROWS + BESIDE);
+    let mut push = |terms: Vec<f64>, value: f64, weight: f64| {
+        rows.push(Row {
+            terms: terms.into_iter().map(|term| weight * term).collect(),
+            value: weight * value,
+            weight,
+        });
+    };
+    push(on_way.clone(), -height, ON_WAY_WEIGHT);
+    let shifts = [u, v].map(|axis| (axis, DVec3::ZERO, ACROSS_WEIGHT));
+    let turns = [(u, TURNED_WEIGHT), (v, TURNED_WEIGHT), (axis, SPUN_WEIGHT)]
+        .map(|(axis, weight)| (DVec3::ZERO, axis / length, weight));
+    for (by, turn, weight) in shifts.into_iter().chain(turns) {
+        for share in CLOSE {
+            let d = share * WIDTH_MM;
+            let [ahead, back] = [d, -d].map(|d| off(by * d, turn * d));
+            let pairs = || ahead.iter().zip(&back);
+            push(
+                pairs().map(|(a, b)| (a - b) / (2.0 * share)).collect(),
+                0.0,
+                weight,
+            );
+            let risen = pairs().zip(&on_way).map(|((a, b), on)| 0.5 * (a + b) - on);
+            push(risen.collect(), height * rise(share), weight * RISE_SHARE);
+        }
+    }
+    let mut numbers = Numbers(number as u64);
+    for i in 0..BESIDE {
+        let share = 0.05f64.powf(i as f64 / BESIDE as f64);
+        let by = (u * numbers.next() + v * numbers.next()) * (ASIDE_MM * share);
+        let turn = u * numbers.next() + v * numbers.next() + axis * (SPIN_SHARE * numbers.next());
+        let turn = turn * (TURNED_MM / length * share);
+        let far = by.length().hypot((turn * length).length()) / WIDTH_MM;
+        push(off(by, turn), height * (rise(far) - 1.0), BESIDE_WEIGHT);
+    }
+    rows
+}
+
+/// Middle of where the energy acts at a pose, fixed part's frame, and L, its root mean square distance from there, mm.
+fn extent(samples: &[Sample], on_way: &[f64], pose: &DAffine3) -> (DVec3, f64) {
+    let weights = || {
+        (samples.iter().zip(on_way.chunks_exact(2)))
+            .map(|((at, q), terms)| (pose.transform_point3(*at), q.norm() * terms[0].hypot(terms[1])))
+    };
+    let total = weights().map(|(_, w)| w).sum::<f64>().max(f64::MIN_POSITIVE);
+    let middle = weights().map(|(p, w)| p * w).sum::<DVec3>() / total;
+    let squared = weights()
+        .map(|(p, w)| p.distance_squared(middle) * w)
+        .sum::<f64>()
+        / total;
+    (middle, squared.sqrt().max(WIDTH_MM))
+}
+
+/// Fits the charges. `None` where no charges have a well at the fit.
 fn fit(baked: &mut BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Option<()> {
     let energy = Energy::new(&baked.record, &[], &baked.nodes)?;
-    let across_of = |way: DVec3| {
-        let u = way.any_orthonormal_vector();
-        [u, way.cross(u)]
-    };
-    let across = across_of(DVec3::from_array(baked.record.way.map(f64::from)));
-    let rows: Vec<(Vec<f64>, f64)> = (travels(way).into_par_iter().enumerate())
-        .flat_map_iter(|(number, travel)| {
-            let pose = (way.pose)(travel);
-            let on_way = terms(&energy, samples, &pose, DVec3::ZERO);
-            // Where the energy acts, and how large it is about there.
-            let weights = || {
-                (samples.iter().zip(on_way.chunks_exact(2))).map(|((at, q), t)| {
-                    let weight = q.norm() * t[0][0].hypot(t[1][0]);
-                    (pose.transform_point3(*at), weight)
-                })
-            };
-            let total: f64 = weights().map(|(_, w)| w).sum();
-            let middle = weights().map(|(p, w)| p * w).sum::<DVec3>() / total.max(f64::MIN_POSITIVE);
-            let spread = weights()
-                .map(|(p, w)| p.distance_squared(middle) * w)
-                .sum::<f64>();
-            let length = (spread / total.max(f64::MIN_POSITIVE)).sqrt().max(WIDTH_MM);
-            let height = ((way.length_mm + BEYOND_MM - travel) / (way.length_mm + BEYOND_MM)).max(0.0);
-            let about_middle = terms(&energy, samples, &pose, middle);
-            let mut rows = Vec::new();
-            let column = |of: &dyn Fn(&[f64; 7]) -> f64| about_middle.iter().map(of).collect::<Vec<f64>>();
-            for axis in across {
-                let gradient = column(&|t| WIDTH_MM * axis.dot(DVec3::new(t[1], t[2], t[3])));
-                rows.push((gradient, 0.0, ACROSS_WEIGHT));
-            }
-            for k in 4..7 {
-                rows.push((column(&|t| WIDTH_MM / length * t[k]), 0.0, TURNED_WEIGHT));
-            }
-            rows.push((column(&|t| t[0]), -height, ON_WAY_WEIGHT));
-            let mut numbers = Numbers(number as u64);
-            for i in 0..BESIDE {
-                let share = 0.05f64.powf(i as f64 / BESIDE as f64);
-                let by = (across[0] * numbers.next() + across[1] * numbers.next()) * (ASIDE_MM * share);
-                let turn = numbers.vector() * (TURNED_MM / length * share);
-                let beside = terms(&energy, samples, &moved(&pose, by, turn, middle), DVec3::ZERO);
-                let off = (by.length_squared() + (turn * length).length_squared()) / (WIDTH_MM * WIDTH_MM);
-                let row = beside.iter().map(|t| t[0]).collect();
-                rows.push((row, -height / (1.0 + off).sqrt(), BESIDE_WEIGHT));
-            }
-            (rows.into_iter()).map(|(row, value, weight): (Vec<f64>, f64, f64)| {
-                (
-                    row.into_iter().map(|v| weight * v).collect::<Vec<f64>>(),
-                    weight * value,
-                )
-            })
-        })
+    let rows: Vec<Row> = (travels(way).into_par_iter().enumerate())
+        .flat_map_iter(|(number, travel)| rows(&energy, samples, way, number, travel))
         .collect();
-    let matrix = DMatrix::from_fn(rows.len(), 2 * samples.len(), |i, j| rows[i].0[j]);
-    let wanted = DVector::from_fn(rows.len(), |i, _| rows[i].1);
+    let matrix = DMatrix::from_fn(rows.len(), 2 * samples.len(), |i, j| rows[i].terms[j]);
+    let wanted = DVector::from_fn(rows.len(), |i, _| rows[i].value);
     let mut normal = matrix.tr_mul(&matrix);
     let ridge = RIDGE * normal.trace() / normal.nrows() as f64;
     for i in 0..normal.nrows() {
@@ -345,10 +445,9 @@ fn fit(baked: &mut BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Option<()>
     }
     let fitted = normal.cholesky()?.solve(&matrix.tr_mul(&wanted));
     let left = &wanted - &matrix * &fitted;
-    // Six rows on the way come first at each place.
-    let beside: Vec<f64> = (0..rows.len())
-        .filter(|i| i % (BESIDE + 6) >= 6)
-        .map(|i| left[i] / BESIDE_WEIGHT)
+    let beside: Vec<f64> = (rows.iter().zip(left.iter()).enumerate())
+        .filter(|(i, _)| i % (ON_WAY_ROWS + BESIDE) >= ON_WAY_ROWS)
+        .map(|(_, (row, left))| left / row.weight)
         .collect();
     baked.deviation = (beside.iter().map(|v| v * v).sum::<f64>() / beside.len() as f64).sqrt();
     baked.charges = (samples.iter().zip(fitted.as_slice().chunks_exact(2)))
@@ -368,86 +467,93 @@ fn fit(baked: &mut BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Option<()>
     Some(())
 }
 
-/// States the largest force, and the stiffness that majorises the energy at each depth: measured from one pose to another one.
+/// A pose beside the way: its depth on the scale of the tables, its force, and how much displacements from it exceed the linear model.
+struct Beside {
+    depth: f64,
+    force: f64,
+    /// Displacement, rotation vector, and twice the excess: across the way, along it, in rotation, and all at once.
+    excess: [(DVec3, DVec3, f64); 4],
+}
+
+impl Beside {
+    fn random(seed: u64, baked: &BakedEnergy, pose: &DAffine3, center_of_mass: DVec3) -> Self {
+        let mut numbers = Numbers(seed);
+        let axis = DVec3::from_array(baked.record.way.map(f64::from));
+        let share = 0.5 + 0.5 * numbers.next();
+        let middle = pose.transform_point3(center_of_mass);
+        let by = numbers.vector() * (ASIDE_MM * share);
+        let pose = moved(pose, by, numbers.vector() * (0.15 * share), middle);
+        let about = pose.transform_point3(center_of_mass);
+        let here = baked.at(&pose, about);
+        let excess = [0, 1, 2, 3].map(|family| {
+            let size = 0.55 + 0.45 * numbers.next();
+            let by = numbers.vector().normalize_or_zero() * (STIFFNESS_MM * size);
+            let turn = numbers.vector().normalize_or_zero() * (STIFFNESS_RAD * size);
+            let along = axis * axis.dot(by);
+            let (by, turn) = match family {
+                0 => (by - along, DVec3::ZERO),
+                1 => (along, DVec3::ZERO),
+                2 => (DVec3::ZERO, turn),
+                _ => (by, turn),
+            };
+            let there = baked.at(&moved(&pose, by, turn, about), about).energy;
+            let linear = here.slope.dot(by) + here.turn.dot(turn);
+            (by, turn, 2.0 * (there - here.energy - linear - STIFFNESS_SLACK))
+        });
+        Self {
+            depth: (-here.energy).clamp(0.0, 1.0) * (ENERGY_DEPTHS - 1) as f64,
+            force: here.slope.length(),
+            excess,
+        }
+    }
+
+    /// Entries of a table on either side of its depth, and the share of the second one.
+    fn entries(&self) -> ([usize; 2], f64) {
+        let below = self.depth.floor();
+        ([below as usize, self.depth.ceil() as usize], self.depth - below)
+    }
+}
+
+/// States the largest force, and the stiffness that majorises the energy at each depth.
 fn majorise(baked: &mut BakedEnergy, way: &Way<'_>, center_of_mass: DVec3) {
     let axis = DVec3::from_array(baked.record.way.map(f64::from));
-    let last = (ENERGY_DEPTHS - 1) as f64;
     let travels = travels(way);
     let this = &*baked;
-    /// Energy at a pose, its largest force, and the excess over the linear model for each family of displacements.
-    struct Seen {
-        depth: f64,
-        force: f64,
-        excess: [(DVec3, DVec3, f64); 4],
-    }
-    let seen: Vec<Seen> = (0..STIFFNESS_POSES)
+    let seen: Vec<Beside> = (0..STIFFNESS_POSES)
         .into_par_iter()
         .map(|i| {
-            let mut numbers = Numbers(0x5eed_0000 + i as u64);
             let pose = (way.pose)(travels[i % travels.len()]);
-            let share = 0.5 + 0.5 * numbers.next();
-            let middle = pose.transform_point3(center_of_mass);
-            let pose = moved(
-                &pose,
-                numbers.vector() * (ASIDE_MM * share),
-                numbers.vector() * (0.15 * share),
-                middle,
-            );
-            let about = pose.transform_point3(center_of_mass);
-            let here = this.at(&pose, about);
-            let excess = [0, 1, 2, 3].map(|family| {
-                let size = 0.55 + 0.45 * numbers.next();
-                let by = numbers.vector().normalize_or_zero() * (STIFFNESS_MM * size);
-                let turn = numbers.vector().normalize_or_zero() * (STIFFNESS_RAD * size);
-                let (by, turn) = match family {
-                    0 => (by - axis * axis.dot(by), DVec3::ZERO),
-                    1 => (axis * axis.dot(by), DVec3::ZERO),
-                    2 => (DVec3::ZERO, turn),
-                    _ => (by, turn),
-                };
-                let there = this.at(&moved(&pose, by, turn, about), about).energy;
-                let linear = here.slope.dot(by) + here.turn.dot(turn);
-                (by, turn, 2.0 * (there - here.energy - linear - STIFFNESS_SLACK))
-            });
-            Seen {
-                depth: (-here.energy).clamp(0.0, 1.0) * last,
-                force: here.slope.length(),
-                excess,
-            }
+            Beside::random(0x5eed_0000 + i as u64, this, &pose, center_of_mass)
         })
         .collect();
     let mut tables = [[0.0f64; ENERGY_DEPTHS]; 3];
-    let around = |depth: f64| [depth.floor() as usize, depth.ceil() as usize];
     for seen in &seen {
-        for (family, table) in tables.iter_mut().enumerate() {
-            let (by, turn, excess) = seen.excess[family];
-            let squared = by.length_squared() + turn.length_squared();
-            for entry in around(seen.depth) {
-                table[entry] = table[entry].max(excess / squared.max(f64::MIN_POSITIVE));
+        for (table, (by, turn, excess)) in tables.iter_mut().zip(seen.excess) {
+            let squared = (by.length_squared() + turn.length_squared()).max(f64::MIN_POSITIVE);
+            for entry in seen.entries().0 {
+                table[entry] = table[entry].max(excess / squared);
             }
         }
     }
     // Displacements of both kinds at once need more where translation and rotation are coupled.
     let mut factors = [1.0f64; ENERGY_DEPTHS];
     for seen in &seen {
-        let (by, turn, excess) = seen.excess[3];
-        let along = axis.dot(by);
-        let [below, above] = around(seen.depth);
-        let share = seen.depth - below as f64;
+        let ([below, above], share) = seen.entries();
         let at = |table: &[f64; ENERGY_DEPTHS]| table[below] + share * (table[above] - table[below]);
-        let squared = at(&tables[0]) * (by.length_squared() - along * along)
-            + at(&tables[1]) * along * along
+        let (by, turn, excess) = seen.excess[3];
+        let along = axis.dot(by) * axis.dot(by);
+        let modelled = at(&tables[0]) * (by.length_squared() - along)
+            + at(&tables[1]) * along
             + at(&tables[2]) * turn.length_squared();
         for entry in [below, above] {
             factors[entry] = factors[entry]
-                .max(excess / squared.max(f64::MIN_POSITIVE))
-                .min(3.0);
+                .max(excess / modelled.max(f64::MIN_POSITIVE))
+                .min(MOST_COUPLED);
         }
     }
+    let table =
+        |which: usize, unit: f64| core::array::from_fn(|i| (tables[which][i] * factors[i] * unit) as f32);
     let per_mm2 = 1.0 / (M_PER_MM * M_PER_MM);
-    let table = |which: usize, unit: f64| {
-        core::array::from_fn(|i| (tables[which][i].max(0.0) * factors[i] * unit) as f32)
-    };
     let record = &mut baked.record;
     record.across = table(0, per_mm2);
     record.along = table(1, per_mm2);

@@ -30,6 +30,10 @@ const SPEED_MM_S: f64 = 25.0;
 const SETTLING_TICKS: u32 = 150;
 /// A part that comes so near to the end of its way is in, mm.
 const IN_MM: f64 = 0.1;
+/// Time of a careless hand from one place to the next, s, and how far it goes aside and out, mm, and turns, rad.
+const WANDER_S: f64 = 0.25;
+const WANDER_MM: f64 = 5.0;
+const WANDER_RAD: f64 = 0.1;
 /// Straight legs of the hand's motion along the way.
 const LEGS: u32 = 8;
 
@@ -110,6 +114,8 @@ pub(crate) struct Seen {
     pub overlap_mm: f64,
     /// Ticks missed.
     pub missed: u32,
+    /// Instructions of the longest tick; NaN where they are not counted.
+    pub instructions: f64,
 }
 
 impl Followed {
@@ -193,11 +199,7 @@ impl Followed {
 
     /// Inserts the part.
     pub fn insert(&self, off: &Off, help: Help, rig: &RigSpec) -> Result<Seen, LabError> {
-        let mut scenario = self.scenario(off);
-        if help == Help::Energy {
-            let name = ParameterId::Guidance.row().name;
-            scenario.parameters.insert(name.to_owned(), BY_ENERGY);
-        }
+        let scenario = self.helped(help, self.scenario(off));
         let settings = GuideSettings {
             recognising: false,
             ..GuideSettings::default()
@@ -241,6 +243,115 @@ impl Followed {
         scenario
     }
 
+    /// Placement of the moving part in the other part's frame after a travel outward from the fit, mm.
+    pub fn place(&self, travel_mm: f64) -> DAffine3 {
+        self.other.inverse() * self.way.at(-travel_mm)
+    }
+
+    /// Direction of the way outward, other part's frame.
+    pub fn outward(&self) -> DVec3 {
+        self.other.inverse().transform_vector3(-self.way.into)
+    }
+
+    /// Centre of mass of the moving part, its frame, mm.
+    pub fn center_of_mass(&self) -> DVec3 {
+        let model = &self.scene.model;
+        model.shapes[model.parts[self.parts[0]].shape].center_of_mass
+    }
+
+    /// Length of the part of the way on which the mating faces overlap, mm.
+    pub fn depth_mm(&self) -> f64 {
+        self.depth_mm
+    }
+
+    /// A careless hand for `duration_s`, helped by the geometric energy: about the mouth, in and out of the fit, aside and turned at random, four times a second.
+    pub fn wander(
+        &self,
+        random: &mut fastrand::Rng,
+        duration_s: f64,
+        rig: &RigSpec,
+    ) -> Result<Recording, LabError> {
+        let mut scenario = self.helped(Help::Energy, self.scenario.clone());
+        let total = self.travel_mm(&self.start).abs();
+        let (x, y) = self.way.into.any_orthonormal_pair();
+        let grip = DVec3::from_array(scenario.hand.grip_mm);
+        let held = self.start.inverse().transform_point3(grip);
+        let count = (duration_s / WANDER_S).round() as usize;
+        scenario.hand.keyframes = vec![key(0.0, [0.0; 3], [0.0; 3])];
+        scenario.hand.keyframes.extend((1..=count).map(|i| {
+            let mut signed = || 2.0 * random.f64() - 1.0;
+            let travel = -0.5 * (1.0 + signed()) * total.min(self.depth_mm + WANDER_MM);
+            let aside = WANDER_MM * (signed() * x + signed() * y);
+            let turn = DQuat::from_scaled_axis(WANDER_RAD * DVec3::new(signed(), signed(), signed()));
+            let at = self.way.at(travel);
+            let rotation = DQuat::from_mat3(&(at.matrix3 * self.start.matrix3.inverse()));
+            let offset = at.transform_point3(held) - grip + aside;
+            let turn = (turn * rotation).to_scaled_axis().to_array().map(f64::to_degrees);
+            key(WANDER_S * i as f64, offset.to_array(), turn)
+        }));
+        scenario.run.duration_s = WANDER_S * count as f64;
+        // Energies are summed over every tick.
+        scenario.run.telemetry_every_ticks = 1;
+        let client = connect(&scenario, rig)?;
+        Ok(record(&client, &scenario, &self.scene, None)?)
+    }
+
+    /// A hand that goes to a height above the mouth on the way and stays there.
+    pub fn hover(&self, height_mm: f64, help: Help, rig: &RigSpec) -> Result<Seen, LabError> {
+        let mut scenario = self.helped(help, self.scenario.clone());
+        let total = self.travel_mm(&self.start).abs();
+        let at = self.way.at(-(self.depth_mm + height_mm));
+        let offset = at.translation - self.way.at(-total).translation;
+        scenario.hand.keyframes = vec![
+            key(0.0, [0.0; 3], [0.0; 3]),
+            key(0.5, offset.to_array(), [0.0; 3]),
+        ];
+        scenario.run.duration_s = 1.0;
+        let client = connect(&scenario, rig)?;
+        Ok(self.seen(&record(&client, &scenario, &self.scene, None)?))
+    }
+
+    /// Largest rise over any interval of the work of the geometric energy on the part and its potential together, mJ, while it is fully engaged: energy
+    /// that it made. Every tick's sample is needed.
+    pub fn made_by_energy_mj(&self, energy: &BakedEnergy, samples: &[Telemetry]) -> f64 {
+        let center = self.center_of_mass();
+        let depth_mj =
+            1e3 * f64::from(ParameterId::GeometricForce.row().default / energy.record.largest_force);
+        let (mut last, mut work, mut least, mut made): (Option<DAffine3>, f64, f64, f64) =
+            (None, 0.0, f64::NAN, 0.0);
+        for sample in samples {
+            let Some((_, pose)) = (sample.object.as_ref()).filter(|_| sample.guidance.engagement >= 1.0)
+            else {
+                (last, work, least) = (None, 0.0, f64::NAN);
+                continue;
+            };
+            let at = pose_mm(pose);
+            if let Some(before) = last {
+                let moved = at.transform_point3(center) - before.transform_point3(center);
+                let turned = DQuat::from_mat3(&(at.matrix3 * before.matrix3.inverse())).to_scaled_axis();
+                let of = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+                let wrench = &sample.guidance.wrench;
+                // N mm are mJ.
+                work += of(wrench.force).dot(moved) + 1e3 * of(wrench.torque).dot(turned);
+            }
+            last = Some(at);
+            let potential = energy.at(&(self.other.inverse() * at), DVec3::ZERO).energy;
+            let total = work + depth_mj * potential;
+            least = least.min(total);
+            made = made.max(total - least);
+        }
+        made
+    }
+
+    /// The scenario with what this help needs.
+    fn helped(&self, help: Help, mut scenario: Scenario) -> Scenario {
+        if help == Help::Energy {
+            let name = ParameterId::Guidance.row().name;
+            scenario.parameters.insert(name.to_owned(), BY_ENERGY);
+        }
+        scenario
+    }
+
     /// Travel of the part at a placement, mm: 0 in the fit, negative before it.
     fn travel_mm(&self, at: &DAffine3) -> f64 {
         let origin = at.transform_point3(self.target.moving.origin);
@@ -257,6 +368,7 @@ impl Followed {
             peak_n: recording.outcome.peak_force_n,
             overlap_mm: overlap::penetration_mm(&self.scene, &recording.samples),
             missed: recording.outcome.missed_ticks,
+            instructions: (recording.outcome.instructions_per_tick_max).map_or(f64::NAN, f64::from),
         };
         let first = recording.samples.first().map_or(0, |sample| sample.tick);
         let mut held_since = None;

@@ -15,7 +15,7 @@
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
 //!
 //! Source: M. Behandish, H. Ilieş, *Peg-in-Hole Revisited: A Generic Force Model for Haptic Assembly*, JCISE 15(4), 2015, eqs. 11 to 13; rounds and
-//! majoriser are ours. Cost on a Cortex-M7: [`CHARGES_PER_TICK`] times 170 instructions and 1,500 more; none with another method.
+//! majoriser are ours. Cost on a Cortex-M7: [`CHARGES_PER_TICK`] times 90 instructions and 1,500 more; none with another method.
 
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::{ENERGY_DEPTHS, Energy, SceneImage};
@@ -30,7 +30,7 @@ use crate::math::vector::length;
 use crate::settings::{GuidanceMethod, GuidanceSettings};
 
 /// Charges evaluated in a tick.
-pub(crate) const CHARGES_PER_TICK: u16 = 96;
+pub(crate) const CHARGES_PER_TICK: u16 = 192;
 /// Largest change of the engagement a tick.
 const STEP: f32 = 1.0 / 256.0;
 

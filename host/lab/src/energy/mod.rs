@@ -7,7 +7,7 @@
 //! the well is (the paper's diameter of a constraint: the convex part around the minimum); and what the energy does sideways above the mouth, which the
 //! paper does not show.
 
-mod sections;
+pub(crate) mod sections;
 
 use std::fmt;
 

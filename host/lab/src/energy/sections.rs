@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec2, DVec3};
 use mortise_brep::Shape;
+use tempfile::NamedTempFile;
 
 use crate::LabError;
 use crate::step_text::{StepText, prism};
@@ -12,9 +13,9 @@ use crate::step_text::{StepText, prism};
 const HALF: f64 = 25.0;
 const HEIGHT: f64 = 40.0;
 /// Depth of the holes, mm.
-pub(super) const DEPTH: f64 = 30.0;
+pub(crate) const DEPTH: f64 = 30.0;
 /// Length of the pegs, mm.
-pub(super) const LENGTH: f64 = 45.0;
+pub(crate) const LENGTH: f64 = 45.0;
 /// Radius of the round section, and half the width of the square one, mm.
 const RADIUS: f64 = 10.0;
 /// Corners of a round section: its chords are 12 µm off the circle.
@@ -22,7 +23,7 @@ const CORNERS: usize = 64;
 
 /// A section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Section {
+pub(crate) enum Section {
     Circular,
     Square,
     /// Round on one side, with a corner on the other.
@@ -63,8 +64,8 @@ impl Section {
         }
     }
 
-    /// The block, its top at z = 0 and the hole about the z axis, and the peg, its foot at the origin and its length along z.
-    pub fn shapes(self) -> Result<[Shape; 2], LabError> {
+    /// A STEP file of the block, its top at z = 0 and the hole about the z axis, and the peg, its foot at `foot_mm` on that axis and its length along it.
+    pub fn file(self, foot_mm: f64) -> Result<NamedTempFile, LabError> {
         let mut text = StepText::new();
         let corners = self.corners();
         let (corners_of_peg, loops) = prism(&corners, [0.0, LENGTH]);
@@ -73,8 +74,17 @@ impl Section {
             text.polyhedron(&corners_of_peg, &loops),
         );
         text.part("block", block, DAffine3::IDENTITY);
-        text.part("peg", peg, DAffine3::IDENTITY);
-        let model = mortise_brep::load_step(text.file()?.path())?;
+        text.part(
+            "peg",
+            peg,
+            DAffine3::from_translation(DVec3::new(0.0, 0.0, foot_mm)),
+        );
+        text.file()
+    }
+
+    /// The shapes of the block and the peg, as in [`Self::file`]; the peg's foot is at its origin.
+    pub fn shapes(self) -> Result<[Shape; 2], LabError> {
+        let model = mortise_brep::load_step(self.file(0.0)?.path())?;
         let shape = |name: &str| {
             let part = model.parts.iter().find(|part| part.name == name);
             part.map(|part| model.shapes[part.shape].clone())

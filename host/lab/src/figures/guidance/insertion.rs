@@ -113,7 +113,13 @@ pub(super) fn starts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), La
     let designed = Designed::random(3);
     let file = guided::file(&designed.text())?;
     let followed = Followed::new(file.path(), ["moving", "fixed"])?;
-    for (help, how) in [(Help::Nothing, "contact alone"), (Help::Way, "its way held")] {
+    let (followed, _) = followed.with_energy()?;
+    let helps = [
+        (Help::Nothing, "contact alone"),
+        (Help::Energy, "its energy alone"),
+        (Help::Way, "its way held"),
+    ];
+    for (help, how) in helps {
         let seen = trials(count, |index| {
             let mut random = fastrand::Rng::with_seed(index as u64);
             let (aside, turn) = (ASIDE_MM * random.f64(), TURN_DEG * random.f64());

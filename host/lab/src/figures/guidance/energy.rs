@@ -1,0 +1,370 @@
+//! The geometric energy as a board takes it: where its minimum is, its gradient, what it costs and what energy it makes.
+
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_energy::{BakedEnergy, Density, Kernel, Pair, Placed, bytes};
+use mortise_shapes::{Designed, KINDS};
+
+use super::super::{Plan, Row};
+use crate::LabError;
+use crate::energy::sections::{DEPTH, Section};
+use crate::followed::{Followed, Help, off};
+use crate::guided::{self, SIM};
+use crate::parallel::trials;
+
+/// Largest distance of the minimum from the way, mm, and tilt, mrad; also of the lateral minimum above the mouth.
+const BIAS_MM: f64 = 0.15;
+const BIAS_MRAD: f64 = 15.0;
+/// Largest error of gradients, % of the largest.
+const GRADIENT_PERCENT: f64 = 1.0;
+/// Bytes of a pair.
+const BYTES: f64 = 32.0 * 1024.0;
+/// Instructions of the energy, and of a tick in all.
+const ENERGY_INSTRUCTIONS: f64 = 20_000.0;
+const TICK_INSTRUCTIONS: f64 = 120_000.0;
+/// Energy made, mJ.
+const MADE_MJ: f64 = 1.0;
+/// Heights above the mouth, mm.
+const ABOVE_MM: [f64; 3] = [1.0, 2.0, 5.0];
+/// Reach of the grid on which the least energy is sought above the mouth, mm, and the step that ends the search, mm.
+const GRID_MM: f64 = 3.0;
+const ENOUGH_MM: f64 = 1e-3;
+/// Poses at which the gradient is compared, their distance from the way, mm and rad, and the step of the differences, mm: so short that hardly any charge passes from
+/// one cell of the lattice to the next, where the slope has a step; a tenth of it in rotation, rad.
+const GRADIENTS: usize = 1000;
+const GRADIENTS_QUICK: usize = 100;
+const ASIDE_MM: f64 = 4.0;
+const TURNED_RAD: f64 = 0.15;
+const DIFFERENCE: f64 = 1e-7;
+/// The pair whose ticks are counted, the height above its mouth, mm, and how far off the hand is that puts it in, mm and degrees.
+const THESIS_PAIR: &str = include_str!("../../../data/pair_d18.75_clear0.02.step");
+const HOVER_MM: f64 = 2.0;
+const ASIDE_START_MM: f64 = 1.0;
+const TURNED_START_DEG: f64 = 2.0;
+/// Seconds of careless motion, four changes a second, and of each recording.
+const WANDER_S: f64 = 250.0;
+const WANDER_QUICK_S: f64 = 10.0;
+const RECORDING_S: f64 = 5.0;
+/// Lattice of the published form beside ours, mm, as `mortise-lab energy` has it.
+const PUBLISHED_MM: [f64; 2] = [2.5, 8.0];
+
+/// A pair with its energy.
+struct Subject {
+    what: String,
+    followed: Followed,
+    energy: BakedEnergy,
+    section: Option<Section>,
+}
+
+impl Subject {
+    fn of_section(section: Section) -> Result<Self, LabError> {
+        // The peg begins seated: the fit is where the file has it.
+        let file = section.file(-DEPTH)?;
+        let (followed, energy) = Followed::new(file.path(), ["peg", "block"])?.with_energy()?;
+        Ok(Self {
+            what: format!("{} peg at exact fit", section.name()),
+            followed,
+            energy,
+            section: Some(section),
+        })
+    }
+
+    fn random(seed: u64) -> Result<Self, LabError> {
+        let designed = Designed::random(seed);
+        let file = guided::file(&designed.text())?;
+        let (followed, energy) = Followed::new(file.path(), ["moving", "fixed"])?.with_energy()?;
+        Ok(Self {
+            what: designed.kind.to_owned(),
+            followed,
+            energy,
+            section: None,
+        })
+    }
+
+    fn energy_at(&self, pose: &DAffine3) -> f64 {
+        self.energy.at(pose, DVec3::ZERO).energy
+    }
+
+    /// The energy in double precision, by weights of the eight nodes about each charge: written apart from what the board computes.
+    fn exact(&self, pose: &DAffine3) -> f64 {
+        let record = &self.energy.record;
+        let size = record.size.map(usize::from);
+        let origin = DVec3::from_array(record.origin.map(f64::from));
+        let mut sum = 0.0;
+        for charge in &self.energy.charges {
+            let at = pose.transform_point3(1e3 * DVec3::from_array(charge.at.map(f64::from)));
+            let place = (1e-3 * at - origin) / f64::from(record.step);
+            let first = place.floor();
+            let last = DVec3::from_array(size.map(|n| n as f64 - 2.0));
+            if !(first.cmpge(DVec3::ZERO).all() && first.cmple(last).all()) {
+                continue;
+            }
+            let share = place - first;
+            let first = first.to_array().map(|x| x as usize);
+            for corner in 0..8 {
+                let bit = [0, 1, 2].map(|axis| corner >> axis & 1);
+                let weight: f64 = (0..3)
+                    .map(|k| if bit[k] == 1 { share[k] } else { 1.0 - share[k] })
+                    .product();
+                let [i, j, k] = [0, 1, 2].map(|axis| first[axis] + bit[axis]);
+                let [re, im] = self.energy.nodes[i + size[0] * (j + size[1] * k)].map(f64::from);
+                let [q, p] = charge.charge.map(f64::from);
+                sum -= weight * (re * q - im * p);
+            }
+        }
+        sum
+    }
+
+    /// Distance across the way (mm) and tilt (rad) of the least energy near the way, at a travel from the fit.
+    fn bias(&self, travel_mm: f64) -> [f64; 2] {
+        let (aside, tilt) = self.energy.minimum(&self.followed.place(travel_mm));
+        [aside, tilt]
+    }
+
+    /// Distance of the least energy sideways from the way above the mouth, mm, by `of`: the best of a grid, refined.
+    fn aside(&self, height_mm: f64, of: &dyn Fn(&DAffine3) -> f64) -> f64 {
+        let pose = self.followed.place(self.followed.depth_mm() + height_mm);
+        let (u, v) = self.followed.outward().any_orthonormal_pair();
+        let at = |x: [f64; 2]| of(&(DAffine3::from_translation(u * x[0] + v * x[1]) * pose));
+        let (mut best, mut least) = ([0.0; 2], at([0.0; 2]));
+        let mut step = GRID_MM / 6.0;
+        let mut reach = 6;
+        while step > ENOUGH_MM {
+            let middle = best;
+            for i in -reach..=reach {
+                for k in -reach..=reach {
+                    let place = [middle[0] + step * f64::from(i), middle[1] + step * f64::from(k)];
+                    let there = at(place);
+                    if there < least {
+                        (best, least) = (place, there);
+                    }
+                }
+            }
+            (step, reach) = (0.5 * step, 1);
+        }
+        best[0].hypot(best[1])
+    }
+
+    /// Largest error of the gradient over the largest component, %, against central differences.
+    fn gradient_error(&self, poses: usize) -> f64 {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut signed = || 2.0 * random.f64() - 1.0;
+        let (mut error, mut largest) = ([0.0f64; 2], [0.0f64; 2]);
+        for _ in 0..poses {
+            let travel = (self.followed.depth_mm() + 5.0) * 0.5 * (1.0 + signed());
+            let pose = self.followed.place(travel);
+            let about = pose.transform_point3(self.followed.center_of_mass());
+            let by = DVec3::new(signed(), signed(), signed()) * ASIDE_MM;
+            let turn = DVec3::new(signed(), signed(), signed()) * TURNED_RAD;
+            let moved = |pose: &DAffine3, by: DVec3, turn: DVec3| {
+                DAffine3::from_translation(about + by)
+                    * DAffine3::from_quat(DQuat::from_scaled_axis(turn))
+                    * DAffine3::from_translation(-about)
+                    * *pose
+            };
+            let pose = moved(&pose, by, turn);
+            let found = self.energy.at(&pose, about);
+            for axis in DVec3::AXES {
+                let difference = |by: DVec3, turn: DVec3, step: f64| {
+                    let ahead = self.exact(&moved(&pose, by * step, turn * step));
+                    let back = self.exact(&moved(&pose, -by * step, -turn * step));
+                    (ahead - back) / (2.0 * step)
+                };
+                let slope = difference(axis, DVec3::ZERO, DIFFERENCE);
+                let turn = difference(DVec3::ZERO, axis, 0.1 * DIFFERENCE);
+                for (which, (by_difference, exact)) in
+                    [(slope, found.slope), (turn, found.turn)].into_iter().enumerate()
+                {
+                    error[which] = error[which].max((by_difference - exact.dot(axis)).abs());
+                    largest[which] = largest[which].max(exact.dot(axis).abs());
+                }
+            }
+        }
+        100.0 * (error[0] / largest[0]).max(error[1] / largest[1])
+    }
+}
+
+/// Measures every row.
+pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let mut sections = trials(Section::ALL.len(), |index| {
+        Subject::of_section(Section::ALL[index])
+    })?;
+    if std::env::var("ALL").is_ok() { let r = trials(11, |index| Subject::random(2 * KINDS as u64 + index as u64))?; for s in sections.iter().chain(&r) { s.seen(); } return Ok(()); }
+    for subject in &sections {
+        subject.rows(plan, out);
+        published(subject, out)?;
+    }
+    // Pairs that nothing was chosen by: each kind once, in the quick form the first ones.
+    let count = if plan.quick { 2 } else { KINDS };
+    let random = trials(count, |index| Subject::random(2 * KINDS as u64 + index as u64))?;
+    all_of(&random, plan, out);
+    let round = sections.swap_remove(0);
+    cost(out)?;
+    careless(&round, plan, out)
+}
+
+impl Subject {
+    /// Progress on the error stream.
+    fn seen(&self) {
+        let depth = self.followed.depth_mm();
+        let above = ABOVE_MM.map(|height| self.aside(height, &|pose| self.energy_at(pose)));
+        let [seated, half] = [0.0, 0.5].map(|share| self.bias(share * depth));
+        eprintln!(
+            "{}: depth {depth:.1} mm, seated {seated:.3?}, half in {half:.3?}, above {above:.3?}, deviation {:.3}",
+            self.what, self.energy.deviation
+        );
+    }
+
+    fn rows(&self, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
+        all_of(std::slice::from_ref(self), plan, out);
+    }
+}
+
+/// Rows of pairs: the worst of each.
+fn all_of(subjects: &[Subject], plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
+    let what = |row: &str| match subjects {
+        [subject] => format!("board's energy, {}: {row}", subject.what),
+        _ => format!(
+            "board's energy, {} random pairs of as many kinds: {row}",
+            subjects.len()
+        ),
+    };
+    for subject in subjects {
+        subject.seen();
+    }
+    let worst = |of: &dyn Fn(&Subject) -> f64| subjects.iter().map(of).fold(0.0, f64::max);
+    for (share, place) in [(0.0, "seated"), (0.5, "half in")] {
+        let bias = |subject: &Subject| subject.bias(share * subject.followed.depth_mm());
+        let aside = worst(&|subject| bias(subject)[0]);
+        out(Row::at_most(
+            what(&format!("minimum off the fit, {place}")),
+            aside,
+            "mm",
+            BIAS_MM,
+        ));
+        let tilt = 1e3 * worst(&|subject| bias(subject)[1]);
+        out(Row::at_most(
+            what(&format!("minimum tilted, {place}")),
+            tilt,
+            "mrad",
+            BIAS_MRAD,
+        ));
+    }
+    let above = worst(&|subject| {
+        let of = |pose: &DAffine3| subject.energy_at(pose);
+        (ABOVE_MM.into_iter())
+            .map(|height| subject.aside(height, &of))
+            .fold(0.0, f64::max)
+    });
+    out(Row::at_most(
+        what("least energy sideways off the way, 1 to 5 mm above the mouth"),
+        above,
+        "mm",
+        BIAS_MM,
+    ));
+    let poses = if plan.quick { GRADIENTS_QUICK } else { GRADIENTS };
+    let gradient = worst(&|subject| subject.gradient_error(poses));
+    out(Row::at_most(
+        what("gradient and torque against differences, of the largest"),
+        gradient,
+        "%",
+        GRADIENT_PERCENT,
+    ));
+    let size = worst(&|subject| {
+        let placed = Placed {
+            moving: 0,
+            fixed: 1,
+            energy: subject.energy.clone(),
+        };
+        bytes(std::slice::from_ref(&placed)) as f64
+    });
+    out(Row::at_most(what("bytes"), size, "bytes", BYTES));
+}
+
+/// What the published form does above the mouth of a section.
+fn published(subject: &Subject, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let Some(section) = subject.section else {
+        return Ok(());
+    };
+    let [block, peg] = section.shapes()?;
+    let [block, peg] = [block, peg].map(|shape| Density::new(&shape, Kernel::default()));
+    let pair = Pair::new(&block, &peg, PUBLISHED_MM, glam::DMat3::IDENTITY, 1.0);
+    let of = |pose: &DAffine3| pair.at(pose).energy;
+    let aside = (ABOVE_MM.into_iter())
+        .map(|height| subject.aside(height, &of))
+        .fold(0.0, f64::max);
+    out(Row::reported(
+        format!(
+            "published energy, {}: least energy sideways off the way, 1 to 5 mm above the mouth",
+            subject.what
+        ),
+        aside,
+        "mm",
+    ));
+    Ok(())
+}
+
+/// Instructions on the emulated board, and its ticks: a hand that hovers 2 mm above the mouth, and one that goes in.
+fn cost(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let file = guided::file(THESIS_PAIR)?;
+    let (followed, _) = Followed::new(file.path(), ["peg", "block"])?.with_energy()?;
+    let rig = guided::emulated();
+    let what = |row: &str| format!("board's energy, thesis pair at 20 µm, emulated: {row}");
+    let [without, with] = [Help::Nothing, Help::Energy].map(|help| followed.hover(HOVER_MM, help, &rig));
+    let (without, with) = (without?.instructions, with?.instructions);
+    out(Row::at_most(
+        what("instructions of the longest tick above the mouth, more than without it"),
+        with - without,
+        "instructions",
+        ENERGY_INSTRUCTIONS,
+    ));
+    let start = off(&mut fastrand::Rng::with_seed(3), ASIDE_START_MM, TURNED_START_DEG);
+    let seen = followed.insert(&start, Help::Energy, &rig)?;
+    out(Row::at_most(
+        what("instructions in the longest tick while it is put in"),
+        seen.instructions,
+        "instructions",
+        TICK_INSTRUCTIONS,
+    ));
+    out(Row::exactly(
+        what("missed ticks"),
+        f64::from(seen.missed),
+        "ticks",
+        0.0,
+    ));
+    Ok(())
+}
+
+/// Energy made while a careless hand goes in and out.
+fn careless(subject: &Subject, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let seconds = if plan.quick { WANDER_QUICK_S } else { WANDER_S };
+    let count = (seconds / RECORDING_S).round() as usize;
+    let seen = trials(count, |index| {
+        let mut random = fastrand::Rng::with_seed(index as u64);
+        let recording = subject.followed.wander(&mut random, RECORDING_S, &SIM)?;
+        let at_part = (subject.followed).made_by_energy_mj(&subject.energy, &recording.samples);
+        let outcome = recording.outcome;
+        Ok([outcome.energy_given_mj, at_part, f64::from(outcome.missed_ticks)])
+    })?;
+    let worst = |k: usize| seen.iter().map(|seen| seen[k]).fold(0.0, f64::max);
+    let motions = 4 * count * RECORDING_S as usize;
+    let what = |row: &str| {
+        format!(
+            "board's energy, {}, {motions} random motions: {row}",
+            subject.what
+        )
+    };
+    out(Row::at_most(
+        what("energy made at the handle"),
+        worst(0),
+        "mJ",
+        MADE_MJ,
+    ));
+    out(Row::at_most(
+        what("energy made at the part"),
+        worst(1),
+        "mJ",
+        MADE_MJ,
+    ));
+    out(Row::exactly(what("missed ticks"), worst(2), "ticks", 0.0));
+    Ok(())
+}
