@@ -1,88 +1,33 @@
-//! Geometric energies: the force is the gradient of the sum over all charges, a free part settles at the least, rounds cause no step, the hand receives no
-//! energy, and without energies of the held part nothing changes.
-//!
-//! Energy delivered to the operator is that of [`mortise_haptics::observer`], which stands outside of the law; its limit is that of targets, 10 µJ.
+//! Geometric energies: the force is the gradient of the sum over all charges, a free part settles at the least, rounds and changes of the method cause no
+//! step, and without energies of the held part nothing changes.
 
 mod support;
 #[path = "support/trial.rs"]
-#[expect(dead_code, reason = "its sequences are of targets; here are its hands")]
+#[expect(dead_code, reason = "its random numbers are used")]
 mod trial;
 #[path = "support/well.rs"]
 mod well;
 
-use std::sync::LazyLock;
-
-use glam::{DQuat, DVec3};
-use mortise_haptics::observer::{Observer, Place};
+use glam::DVec3;
 use mortise_haptics::{
-    Flags, GuidanceMethod, Input, Output, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick,
+    GuidanceMethod, Input, Output, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick,
 };
 use mortise_protocol::image::SceneImage;
 use support::hand::Hand;
-use support::image::{Image, Writer};
-use support::solids::Peg;
+use support::image::Image;
 use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
-use trial::{COUNT_M, COUNT_RAD, Hold, Operator, Random};
-use well::{Frame, SLACK, Well, compose, displacement, moved};
+use trial::Random;
+use well::{
+    Frame, HOLE, HOME, LARGE, OPEN, SLACK, SMALL, Well, compose, displacement, energy_settings, fixed,
+    frame_of, in_fixed, moved, pose_of, with,
+};
 
-/// Limit on the energy delivered beyond what the operator supplied, J.
-const LIMIT_J: f64 = 10e-6;
 /// Largest change of the handle's wrench from tick to tick, as with targets.
 const STEP_N: f32 = 0.05;
 const STEP_NM: f32 = 2e-3;
 /// Charges of a tick, and largest change of the engagement in it.
 const CHARGES_PER_TICK: usize = 96;
 const ENGAGEMENT_STEP: f64 = 1.0 / 256.0;
-
-/// Pose of the fixed part (0) of [`open_scene`]: aligned with nothing.
-fn fixed() -> Frame {
-    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.9);
-    (
-        DVec3::new(0.012, -0.02, 0.031),
-        turn.as_quat().as_dquat().normalize(),
-    )
-}
-
-/// Place of the pegs' origins in the fixed part's frame, m: 7 mm and more above it.
-const HOME: [DVec3; 2] = [DVec3::new(2e-3, 5e-3, 37e-3), DVec3::new(0.0, 0.1, 40e-3)];
-
-/// A slab and two pegs that touch nothing.
-fn open_scene() -> Image {
-    let mut w = Writer::new(1e-3);
-    let slab = w.shape(&support::SLAB);
-    let peg = w.shape(&Peg {
-        radius: 8e-3,
-        half_length: PEG_HALF,
-        around: 16,
-        rings: 2,
-    });
-    let (position, orientation) = fixed();
-    let quat = orientation.as_quat().to_array();
-    w.part(slab, false, position.as_vec3().to_array(), quat);
-    for home in HOME {
-        let (place, _) = compose(fixed(), (home, DQuat::IDENTITY));
-        w.part(peg, true, place.as_vec3().to_array(), quat);
-    }
-    w.finish()
-}
-
-static OPEN: LazyLock<Image> = LazyLock::new(open_scene);
-/// The peg 10 mm in its hole with 1 mm of clearance.
-static HOLE: LazyLock<Image> = LazyLock::new(|| support::exact_hole_and_peg(1e-3, 10e-3));
-/// Sums of four ticks, and of one.
-static LARGE: LazyLock<Well> = LazyLock::new(|| Well::new(1, 0, HOME[0], 38));
-static SMALL: LazyLock<Well> = LazyLock::new(|| Well::new(1, 0, HOME[0] + DVec3::new(1e-3, 2e-3, -1e-3), 9));
-
-fn with(image: &Image, wells: &[&Well]) -> Image {
-    let parts: Vec<_> = wells.iter().map(|well| well.parts.clone()).collect();
-    image.with_energies(&parts)
-}
-
-fn energy_settings() -> Settings {
-    let mut settings = Settings::default();
-    settings.guidance.method = GuidanceMethod::Energy;
-    settings
-}
 
 /// Settings with which the part follows the handle regardless of the energy.
 fn stiff_settings() -> Settings {
@@ -97,20 +42,6 @@ fn stiff_settings() -> Settings {
     settings.passivity.initial_budget_j = f32::INFINITY;
     settings.guidance.geometric_force_n = 1.0;
     settings
-}
-
-fn frame_of(pose: &Pose) -> Frame {
-    (pose.position.as_dvec3(), pose.orientation.as_dquat().normalize())
-}
-
-fn pose_of(frame: Frame) -> Pose {
-    Pose::new(frame.0.as_vec3(), frame.1.as_quat())
-}
-
-/// Pose in the fixed part's frame.
-fn in_fixed(world: Frame) -> Frame {
-    let back = fixed().1.conjugate();
-    (back * (world.0 - fixed().0), back * world.1)
 }
 
 /// Energy (J), force and torque in the world for a largest force of 1 N of each.
@@ -168,13 +99,14 @@ fn lead(
 }
 
 #[test]
-fn the_stiffness_of_the_wells_majorises() {
+fn the_wells_are_least_at_home_and_their_stiffness_majorises() {
     let mut random = Random(11);
     for well in [&*LARGE, &*SMALL] {
         assert!((well.cost(well.home).energy + 1.0).abs() < 1e-6);
         let way = DVec3::from_array(well.parts.record.way.map(f64::from));
         for i in 0..20_000 {
             let pose = well.pose_about(&mut random, 1.5);
+            assert!(well.cost(pose).energy > -1.0 - SLACK, "{pose:?}");
             let (by, turn) = displacement(&mut random, way, i % 4);
             let excess = well.excess(pose, by, turn);
             assert!(
@@ -227,7 +159,7 @@ fn a_free_part_settles_where_the_energy_is_least() {
         let (mut state, at) = held(&scene, 1);
         let mut settings = energy_settings();
         settings.guidance.method = GuidanceMethod::Off;
-        let start = compose(fixed(), LARGE.pose_about(&mut random, 0.7));
+        let start = compose(fixed(), LARGE.pose_about(&mut random, 0.4));
         lead(&mut state, &scene, &settings, (frame_of(&at), start), (150, 300));
         settings.guidance.method = GuidanceMethod::Energy;
         let mut handle = start;
@@ -254,7 +186,6 @@ fn a_free_part_settles_where_the_energy_is_least() {
         let (position, orientation) = frame_of(&pose);
         let off = (position - least.0).length();
         let turned = orientation.angle_between(least.1);
-        println!("{i}: {:.2} µm {:.3} mrad", 1e6 * off, 1e3 * turned);
         assert!(off < 20e-6 && turned < 3e-3, "{i}: {off} m, {turned} rad");
     }
 }
@@ -337,7 +268,6 @@ fn the_engagement_begins_with_the_first_whole_round_and_ends_without_a_step() {
     let image = with(&OPEN, &[&LARGE]);
     let scene = image.open();
     let mut settings = stiff_settings();
-    settings.guidance.geometric_force_n = 10.0;
     let (mut state, at) = held(&scene, 1);
     let goal = moved(
         compose(fixed(), LARGE.home),
@@ -363,12 +293,14 @@ fn the_engagement_begins_with_the_first_whole_round_and_ends_without_a_step() {
         let share = (steps * ENGAGEMENT_STEP).min(1.0);
         let engaged = if is_on { share } else { 1.0 - share };
         assert_eq!(f64::from(out.guidance.engagement), engaged, "{method:?} tick {t}");
-        // In the seven ticks of two rounds a part that yields to steps of 1/256 N at the coupling's 20 kN/m moves by 1.4 µm; at the stiffness of the
-        // model and of the energy that is at most twice 0.7 steps more.
-        let change = (out.guidance.wrench.force - last.force).length();
+        // The part yields to each step at the coupling's 20 kN/m; its motion in the seven ticks of two rounds counts at the stiffness of the model and
+        // once more at that of the energy.
+        let change = f64::from((out.guidance.wrench.force - last.force).length());
+        let yielded = 2.0 * 7.0 * stiffest(&LARGE) / 20e3;
+        let bound = (1.0 + yielded) * ENGAGEMENT_STEP;
         assert!(
-            stiffest(&LARGE) < 2e3 && change < 2.4 / 256.0,
-            "{method:?} tick {t}: {change} N"
+            yielded < 3.0 && change < bound,
+            "{method:?} tick {t}: {change} N of {bound} N"
         );
         last = out.guidance.wrench;
     }
@@ -422,152 +354,6 @@ fn another_method_takes_over_without_a_step_at_the_handle() {
         }
     }
     println!("largest change at the handle {peak} N");
-}
-
-/// Outcome of a hand about a well.
-#[derive(Debug)]
-#[expect(dead_code, reason = "printed")]
-struct Seen {
-    seed: u64,
-    hold: Hold,
-    moving: bool,
-    counted: bool,
-    released: bool,
-    given_j: f64,
-    engaged: f32,
-    /// Deepest and shallowest pose, over the depth.
-    deepest: f64,
-    shallowest: f64,
-    peak_n: f32,
-    touched: u32,
-}
-
-/// A hand in or about a well for two seconds: at rest or on paths through it, in some sequences released for a while, the method changed, in the hole or in
-/// the open.
-fn play(seed: u64, budget_j: Option<f32>) -> Seen {
-    static WELLS: LazyLock<[(Image, Well, Frame); 3]> = LazyLock::new(|| {
-        let off = Well::new(1, 0, HOME[0] + DVec3::new(2e-3, 1e-3, -1.5e-3), 38);
-        let below = DVec3::new(0.3e-3, -0.1e-3, BLOCK_HALF + PEG_HALF - 12e-3);
-        let hole = Well::new(1, 0, below, 38);
-        let upright = (DVec3::ZERO, DQuat::IDENTITY);
-        [
-            (with(&OPEN, &[&LARGE, &SMALL]), LARGE.clone(), fixed()),
-            (with(&OPEN, &[&off]), off, fixed()),
-            (with(&HOLE, &[&hole]), hole, upright),
-        ]
-    });
-    let (image, well, base) = &WELLS[seed as usize % 3];
-    let scene = image.open();
-    let mut random = Random(seed);
-    let mut settings = energy_settings();
-    settings.guidance.geometric_force_n = random.decade(0.5, 10.0) as f32;
-    if let Some(budget) = budget_j {
-        settings.passivity.initial_budget_j = budget;
-    }
-    let period = f64::from(settings.period_s);
-    let mut state = Box::new(State::new());
-    state.load_scene(&scene);
-    let placed = state.placement(1).expect("in the scene");
-    let start = Place {
-        position: placed.position.as_dvec3() + random.direction() * random.within(0.0, 0.02),
-        orientation: DQuat::IDENTITY,
-    };
-    let range = if seed % 3 == 2 { 3e-3 } else { 30e-3 };
-    let mut hand = Operator::new(&mut random, start, range);
-    if hand.readings.is_some() {
-        settings.passivity.position_count_m = COUNT_M as f32;
-        settings.passivity.angle_count_rad = COUNT_RAD as f32;
-    }
-    let (switches, releases) = (random.chance(0.3), random.chance(0.5));
-    let at_grab = hand.input(period);
-    state.grab(&scene, 1, &at_grab.handle).expect("may be grabbed");
-    let grabbed = Place {
-        position: at_grab.handle.position.as_dvec3(),
-        orientation: at_grab.handle.orientation.as_dquat().normalize(),
-    };
-    let mut observer = Observer::new(&scene, &state, &settings, &grabbed).expect("in hand");
-    let firm = hand.hold;
-    let mut seen = Seen {
-        seed,
-        hold: firm,
-        moving: hand.moving,
-        counted: hand.readings.is_some(),
-        released: false,
-        given_j: 0.0,
-        engaged: 0.0,
-        deepest: 0.0,
-        shallowest: 1.0,
-        peak_n: 0.0,
-        touched: 0,
-    };
-    for t in 0..2000 {
-        hand.choose(&mut random, t);
-        if switches && random.chance(0.003) {
-            settings.guidance.method = match random.below(4) {
-                0 => GuidanceMethod::Off,
-                1 => GuidanceMethod::Capped,
-                _ => GuidanceMethod::Energy,
-            };
-        }
-        if let (Hold::Impedance { linear, angular }, true) = (firm, releases && random.chance(0.005)) {
-            let firmness = if random.chance(0.5) { 0.0 } else { 1.0 };
-            seen.released |= firmness == 0.0;
-            hand.hold = Hold::Impedance {
-                linear: [linear[0], firmness * linear[1], linear[2]],
-                angular: [angular[0], firmness * angular[1], angular[2]],
-            };
-        }
-        let input = hand.input(period);
-        observer.look(&state);
-        let out = tick(&mut state, &scene, &settings, &input);
-        let from = hand.at;
-        hand.advance(&out.handle, t, period);
-        observer.tick(&state, &from, &hand.at, &out.handle);
-        assert!(!out.work.flags.contains(Flags::NON_FINITE), "{seed}: tick {t}");
-        seen.engaged = seen.engaged.max(out.guidance.engagement);
-        seen.peak_n = seen.peak_n.max(out.handle.force.length());
-        seen.touched += u32::from(out.work.contacts > 0);
-        if t % 20 == 0 {
-            let (position, orientation) = frame_of(&out.object);
-            let back = base.1.conjugate();
-            let depth = -well.cost((back * (position - base.0), back * orientation)).energy;
-            seen.deepest = seen.deepest.max(depth);
-            seen.shallowest = seen.shallowest.min(depth);
-        }
-    }
-    seen.given_j = observer.given_j();
-    seen
-}
-
-#[test]
-fn no_hand_in_a_well_receives_more_than_ten_microjoules_net() {
-    let all: Vec<Seen> = (0..300).map(|seed| play(seed, None)).collect();
-    let worst = (all.iter().max_by(|a, b| a.given_j.total_cmp(&b.given_j))).unwrap();
-    println!("{worst:?}");
-    assert!(worst.given_j <= LIMIT_J, "{worst:?}");
-    for (what, kind) in [
-        ("moving", (|seen: &Seen| seen.moving) as fn(&Seen) -> bool),
-        ("counted", |seen| seen.counted),
-        ("position", |seen| seen.hold == Hold::Position),
-        ("released", |seen| seen.released),
-        ("touched", |seen| seen.touched > 100),
-        ("in and out", |seen| seen.deepest > 0.9 && seen.shallowest < 0.5),
-    ] {
-        let count = all.iter().filter(|seen| kind(seen)).count();
-        println!("{what}: {count}");
-        assert!((25..275).contains(&count), "{what}: {count}");
-    }
-    assert!(all.iter().all(|seen| seen.engaged > 0.9));
-}
-
-/// The observer sees what the account withholds.
-#[test]
-fn without_the_account_a_well_delivers_energy() {
-    let most = (0..45)
-        .map(|seed| play(seed, Some(f32::INFINITY)).given_j)
-        .fold(0.0, f64::max);
-    println!("{:.1} µJ", 1e6 * most);
-    assert!(most > 10.0 * LIMIT_J, "{most}");
 }
 
 /// Outputs of a hand that swings about the part's start while targets are sent, as text: every number to its last bit.

@@ -1,25 +1,29 @@
 //! A geometric energy of simple form, and the same energy in double precision by its definition.
 //!
-//! The density of the fixed part is a bell about a point in the middle of a cell of its lattice, wider along some axes than along others, its imaginary
-//! part another bell. Charges of the moving part lie about a point of it, at random in one octant and mirrored to the others. So by symmetry the energy is
-//! least, −1, where both points are one and the axes agree, to the last digit.
+//! The density of the fixed part is eight bells at the corners of a box whose middle is that of a cell of its lattice; the imaginary part is narrower ones.
+//! Charges of the moving part lie about the corners of a box of the same size, at random about one corner and mirrored to the others. So by symmetry the
+//! energy is least, −1, where the boxes are one.
+#![allow(dead_code, reason = "each test file uses its share")]
+
+use std::sync::LazyLock;
 
 use glam::{DQuat, DVec3};
+use mortise_haptics::{GuidanceMethod, Pose, Settings};
 use mortise_protocol::image::{ChargeRecord, ENERGY_DEPTHS, EnergyRecord};
 
-use super::support::image::EnergyParts;
+use super::support::image::{EnergyParts, Image, Writer};
+use super::support::solids::Peg;
+use super::support::{PEG_HALF, SLAB, exact_hole_and_peg};
 use super::trial::Random;
 
-/// Nodes of the lattice along each axis, even, and their distance, m.
-const NODES: usize = 22;
+/// Nodes of the lattice along the axes, even, and their distance, m.
+const NODES: [usize; 3] = [26, 24, 30];
 const STEP_M: f64 = 1e-3;
-/// Half widths of the bells, m.
-const WIDTH_M: [DVec3; 2] = [
-    DVec3::new(2.5e-3, 2.0e-3, 3.0e-3),
-    DVec3::new(2.0e-3, 2.5e-3, 2.5e-3),
-];
-/// Half of the box of the charges, m, and its middle in the moving part's frame.
-const CHARGES_M: DVec3 = DVec3::new(2.0e-3, 3.0e-3, 4.0e-3);
+/// Half of the box with the bells, m, and their half widths.
+const BOX_M: DVec3 = DVec3::new(5e-3, 4e-3, 7e-3);
+const WIDTH_M: [f64; 2] = [2.0e-3, 1.7e-3];
+/// Largest distance of charges from the corners along each axis, m, and the middle of their box in the moving part's frame.
+const SPREAD_M: f64 = 1.5e-3;
 const MIDDLE_M: DVec3 = DVec3::new(1e-3, -2e-3, 3e-3);
 /// Poses about the least within which force and stiffness are sampled, and at which the tests look: m and rad.
 pub const ABOUT: [f64; 2] = [6e-3, 0.3];
@@ -56,11 +60,11 @@ impl Well {
     /// A well of part `moving`, least where its frame is `home` off that of part `fixed`, with eight times `octant` charges.
     pub fn new(moving: u16, fixed: u16, home: DVec3, octant: usize) -> Self {
         let center = home + MIDDLE_M;
-        let origin = center - DVec3::splat(0.5 * (NODES - 1) as f64 * STEP_M);
+        let origin = center - DVec3::from_array(NODES.map(|n| 0.5 * (n - 1) as f64 * STEP_M));
         let mut random = Random(17 + octant as u64);
         let charges = (0..8 * octant).scan(DVec3::ZERO, |offset, i| {
             if i % 8 == 0 {
-                *offset = CHARGES_M * DVec3::from_array([0; 3].map(|_| random.within(0.05, 1.0)));
+                *offset = BOX_M + DVec3::from_array([0; 3].map(|_| random.within(-SPREAD_M, SPREAD_M)));
             }
             let side = |axis: usize| if i >> axis & 1 == 0 { 1.0 } else { -1.0 };
             let at = MIDDLE_M + *offset * DVec3::new(side(0), side(1), side(2));
@@ -69,10 +73,11 @@ impl Well {
                 charge: [1.0, 0.4],
             })
         });
-        let nodes = (0..NODES * NODES * NODES).map(|i| {
-            let node = DVec3::from_array([i % NODES, i / NODES % NODES, i / NODES / NODES].map(|n| n as f64));
-            let off = node * STEP_M + origin - center;
-            let bell = |width: DVec3| (-0.5 * (off / width).length_squared()).exp();
+        let [width, height, depth] = NODES;
+        let nodes = (0..width * height * depth).map(|i| {
+            let node = [i % width, i / width % height, i / width / height].map(|n| n as f64);
+            let off = (DVec3::from_array(node) * STEP_M + origin - center).abs() - BOX_M;
+            let bell = |width: f64| (-0.5 * (off / width).length_squared()).exp();
             [
                 (127.0 * bell(WIDTH_M[0])).round() as i8,
                 (-90.0 * bell(WIDTH_M[1])).round() as i8,
@@ -83,7 +88,7 @@ impl Well {
             fixed,
             origin: origin.as_vec3().to_array(),
             step: STEP_M as f32,
-            size: [NODES as u16; 3],
+            size: NODES.map(|n| n as u16),
             largest_force: 1.0,
             way: DVec3::new(0.48, -0.6, 0.64).as_vec3().to_array(),
             ..EnergyRecord::default()
@@ -115,7 +120,8 @@ impl Well {
             let arm = pose.1 * DVec3::from_array(charge.at.map(f64::from));
             let place = (pose.0 + arm - origin) / step;
             let first = place.floor();
-            if first.min_element() < 0.0 || first.max_element() > (NODES - 2) as f64 {
+            let last = DVec3::from_array(NODES.map(|n| (n - 2) as f64));
+            if first.cmplt(DVec3::ZERO).any() || first.cmpgt(last).any() {
                 continue;
             }
             let [x, y, z] = (place - first).to_array().map(|u| [1.0 - u, u]);
@@ -123,7 +129,8 @@ impl Well {
             let [re, im] = charge.charge.map(f64::from);
             for corner in 0..8 {
                 let [i, j, k] = [0, 1, 2].map(|axis| corner >> axis & 1);
-                let node = self.parts.nodes[index[0] + i + NODES * (index[1] + j + NODES * (index[2] + k))];
+                let node = index[0] + i + NODES[0] * (index[1] + j + NODES[1] * (index[2] + k));
+                let node = self.parts.nodes[node];
                 let value = f64::from(node[0]) * re - f64::from(node[1]) * im;
                 let sign = |side: usize| 2.0 * side as f64 - 1.0;
                 let slope = DVec3::new(
@@ -211,4 +218,73 @@ pub fn displacement(random: &mut Random, way: DVec3, family: usize) -> (DVec3, D
 /// A pose moved by `by` and turned about its own origin.
 pub fn moved(pose: Frame, by: DVec3, turn: DVec3) -> Frame {
     (pose.0 + by, (DQuat::from_scaled_axis(turn) * pose.1).normalize())
+}
+
+/// Pose of the fixed part (0) of [`open_scene`]: aligned with nothing.
+pub fn fixed() -> Frame {
+    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.9);
+    (
+        DVec3::new(0.012, -0.02, 0.031),
+        turn.as_quat().as_dquat().normalize(),
+    )
+}
+
+/// Place of the pegs' origins in the fixed part's frame, m: 7 mm and more above it.
+pub const HOME: [DVec3; 2] = [DVec3::new(2e-3, 5e-3, 37e-3), DVec3::new(0.0, 0.1, 40e-3)];
+
+/// A slab and two pegs that touch nothing.
+pub fn open_scene() -> Image {
+    let mut w = Writer::new(1e-3);
+    let slab = w.shape(&SLAB);
+    let peg = w.shape(&Peg {
+        radius: 8e-3,
+        half_length: PEG_HALF,
+        around: 16,
+        rings: 2,
+    });
+    let (position, orientation) = fixed();
+    let quat = orientation.as_quat().to_array();
+    w.part(slab, false, position.as_vec3().to_array(), quat);
+    for home in HOME {
+        let (place, _) = compose(fixed(), (home, DQuat::IDENTITY));
+        w.part(peg, true, place.as_vec3().to_array(), quat);
+    }
+    w.finish()
+}
+
+pub static OPEN: LazyLock<Image> = LazyLock::new(open_scene);
+/// The peg 10 mm in its hole with 1 mm of clearance.
+pub static HOLE: LazyLock<Image> = LazyLock::new(|| exact_hole_and_peg(1e-3, 10e-3));
+/// Sums of four ticks, and of two.
+pub static LARGE: LazyLock<Well> = LazyLock::new(|| Well::new(1, 0, HOME[0], 38));
+pub static SMALL: LazyLock<Well> =
+    LazyLock::new(|| Well::new(1, 0, HOME[0] + DVec3::new(1e-3, 2e-3, -1e-3), 24));
+
+/// The image with the energies of these wells.
+pub fn with(image: &Image, wells: &[&Well]) -> Image {
+    let parts: Vec<_> = wells.iter().map(|well| well.parts.clone()).collect();
+    image.with_energies(&parts)
+}
+
+/// Default settings with the energies as guidance.
+pub fn energy_settings() -> Settings {
+    let mut settings = Settings::default();
+    settings.guidance.method = GuidanceMethod::Energy;
+    settings
+}
+
+/// A pose in double precision.
+pub fn frame_of(pose: &Pose) -> Frame {
+    (pose.position.as_dvec3(), pose.orientation.as_dquat().normalize())
+}
+
+/// A pose in single precision, as the law receives it.
+pub fn pose_of(frame: Frame) -> Pose {
+    Pose::new(frame.0.as_vec3(), frame.1.as_quat())
+}
+
+/// Pose in the fixed part's frame.
+pub fn in_fixed(world: Frame) -> Frame {
+    let back = fixed().1.conjugate();
+    (back * (world.0 - fixed().0), back * world.1)
 }
