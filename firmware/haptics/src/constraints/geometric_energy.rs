@@ -9,7 +9,7 @@
 //! with δ the displacement from X₀. K is the writer's majoriser at that depth, so m(δ) ≥ E(X): the next round starts at an energy no higher than the
 //! model's, and replacing one by the other makes no energy. The wrench w₀ − K·δ of the model is linear, and K positive semi-definite, so it enters the
 //! implicit step as it is. Where K·δ would exceed the largest force (a hand that moves the part faster than rounds follow), X₀ is dragged along, which
-//! takes energy.
+//! takes energy. Where no charge is in the lattice, neither force nor stiffness acts. The engagement rises from the first whole round on, in 256 ticks.
 //!
 //! The energy finds and does not hold: interior overlap is left to contact, and a fit that is to be held to micrometres to targets. Its method is chosen
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
