@@ -250,7 +250,7 @@ fn energies_that_lead_nowhere_are_refused() {
     }
     assert!(refused(&|r| r.origin[1] = f32::NAN) && refused(&|r| r.way = [0.0, 0.6, 0.81]));
     // The block itself: within the header, beyond the end, at no multiple of 4.
-    for at in [4, good.len() as u32 - 20, u32::MAX & !3, block as u32 + 2] {
+    for at in [4, good.len() as u32 - 20, u32::MAX - 3, block as u32 + 2] {
         let mut other = Aligned::new(&good);
         other.bytes_mut()[20..24].copy_from_slice(&at.to_le_bytes());
         other.seal();

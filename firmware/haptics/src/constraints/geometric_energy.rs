@@ -192,7 +192,8 @@ impl Model {
 /// Entry of a table over depths from 0 to 1, linear between entries.
 fn interpolated(row: &[f32; ENERGY_DEPTHS], depth: f32) -> f32 {
     let last = ENERGY_DEPTHS - 1;
-    let at = smaller(larger(depth, 0.0), 1.0) * last as f32;
+    // In this order what is not a number becomes 0.
+    let at = smaller(1.0, larger(0.0, depth)) * last as f32;
     let below = (at as usize).min(last - 1);
     let share = at - below as f32;
     row[below] + share * (row[below + 1] - row[below])
