@@ -13,7 +13,7 @@ pub fn image(filling: usize, seed: u8) -> Vec<u8> {
     let filling = filling.next_multiple_of(4);
     let length = head + filling;
     let mut bytes = MAGIC.to_vec();
-    // The header is little-endian `u32`s: layout, length, CRC, reserved, then offset and count of each section.
+    // The header is little-endian `u32`s: layout, length, CRC, energies, then offset and count of each section.
     let words = [LAYOUT_VERSION, length as u32, 0, 0];
     let sections = (0..SECTIONS).flat_map(|section| {
         let count = if section == BLOB { filling as u32 } else { 0 };

@@ -75,16 +75,42 @@ fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
             sum += voxel.bound + f32::from(voxel.faces[0]);
         }
     }
+    assert!(image.energy(image.energy_count()).is_none());
+    for i in 0..image.energy_count() {
+        let energy = image.energy(i).expect("counted");
+        let record = energy.record;
+        for part in [record.moving, record.fixed] {
+            sum += image.shape_of_part(usize::from(part)).record.radius;
+        }
+        for k in 0..40 {
+            let charge = energy.charges.get(k).map_or([1.0, -0.5], |c| c.charge);
+            // Out to a step beyond the lattice on all sides, and on nodes.
+            let place = record.size.map(|n| {
+                let at = random.below(1 << 16) as f32 / 65536.0 * (f32::from(n) + 1.0) - 1.0;
+                if k % 4 == 0 { at.round() } else { at }
+            });
+            if let Some((value, slope)) = energy.at(place, charge) {
+                let most = 256.0 * (charge[0].abs() + charge[1].abs());
+                assert!(value.abs() <= most || !most.is_finite(), "{value} at {place:?}");
+                sum += value + slope[0] + slope[1] + slope[2];
+            }
+        }
+    }
     sum
 }
 
 /// Damage that the checksum detects is refused.
 #[test]
 fn damage_is_refused() {
-    let good = scene::bytes();
+    for good in [scene::bytes(), scene::energy_bytes()] {
+        damage(&good);
+    }
+}
+
+fn damage(good: &[u8]) {
     let mut random = Random(1);
     for _ in 0..20_000 {
-        let mut aligned = Aligned::new(&good);
+        let mut aligned = Aligned::new(good);
         let at = random.below(good.len());
         aligned.bytes_mut()[at] ^= 1 << random.below(8);
         assert!(SceneImage::open(aligned.bytes()).is_err(), "byte {at}");
@@ -147,6 +173,90 @@ fn sealed_damage(good: &[u8]) {
         opened > 1000 && refused > 1000,
         "{opened} opened, {refused} refused, {sum}"
     );
+}
+
+/// Every byte of what leads to the energies, and of them, in turn with every value.
+#[test]
+fn sealed_damage_of_energies_never_leads_out_of_bounds() {
+    let good = scene::energy_bytes();
+    let at = Aligned::new(&good);
+    let image = SceneImage::open(at.bytes()).unwrap();
+    let energies = image.header().energies as usize;
+    let mut random = Random(3);
+    let (mut opened, mut refused, mut sum) = (0, 0, 0.0);
+    for place in (20..24).chain(energies..good.len()) {
+        for value in 0..=u8::MAX {
+            let mut aligned = Aligned::new(&good);
+            aligned.bytes_mut()[place] = value;
+            aligned.seal();
+            match SceneImage::open(aligned.bytes()) {
+                Ok(image) => {
+                    opened += 1;
+                    sum += use_everything(&image, &mut random);
+                }
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    assert!(
+        opened > 10_000 && refused > 10_000,
+        "{opened} opened, {refused} refused, {sum}"
+    );
+}
+
+/// An energy that names no such part, charge or node, or has a number that is none, is refused.
+#[test]
+fn energies_that_lead_nowhere_are_refused() {
+    let records = scene::energies().0;
+    let good = scene::energy_bytes();
+    let aligned = Aligned::new(&good);
+    let block = SceneImage::open(aligned.bytes()).unwrap().header().energies as usize;
+    let first = block + size_of::<EnergyBlock>();
+    let refused = |change: &dyn Fn(&mut EnergyRecord)| {
+        let mut record = records[0];
+        change(&mut record);
+        let mut other = Aligned::new(&good);
+        other.bytes_mut()[first..first + size_of::<EnergyRecord>()]
+            .copy_from_slice(bytemuck::bytes_of(&record));
+        other.seal();
+        match SceneImage::open(other.bytes()) {
+            Ok(_) => false,
+            Err(error) => {
+                error
+                    == ImageError::Record {
+                        section: 13,
+                        index: 0,
+                    }
+            }
+        }
+    };
+    assert!(!refused(&|_| {}));
+    assert!(refused(&|r| r.moving = 3) && refused(&|r| r.fixed = 3) && refused(&|r| r.fixed = r.moving));
+    assert!(refused(&|r| r.first_charge = 1) && refused(&|r| r.charge_count = u32::MAX));
+    assert!(refused(&|r| r.first_node = 1) && refused(&|r| r.size = [5, 3, 2]));
+    assert!(refused(&|r| r.size = [u16::MAX; 3]) && refused(&|r| r.size = [24, 1, 1]));
+    for bad in [f32::NAN, f32::INFINITY, 0.0, -0.002, f32::from_bits(1)] {
+        assert!(
+            refused(&|r| r.step = bad) && refused(&|r| r.largest_force = bad),
+            "{bad}"
+        );
+    }
+    for bad in [f32::NAN, f32::INFINITY, -1.0] {
+        assert!(
+            refused(&|r| r.across[7] = bad) && refused(&|r| r.along[0] = bad),
+            "{bad}"
+        );
+        assert!(refused(&|r| r.turning[3] = bad), "{bad}");
+    }
+    assert!(refused(&|r| r.origin[1] = f32::NAN) && refused(&|r| r.way = [0.0, 0.6, 0.81]));
+    // The block itself: within the header, beyond the end, at no multiple of 4.
+    for at in [4, good.len() as u32 - 20, u32::MAX - 3, block as u32 + 2] {
+        let mut other = Aligned::new(&good);
+        other.bytes_mut()[20..24].copy_from_slice(&at.to_le_bytes());
+        other.seal();
+        let error = SceneImage::open(other.bytes()).unwrap_err();
+        assert_eq!(error, ImageError::Section { section: 13 }, "{at}");
+    }
 }
 
 /// A brick without samples is opened only where every cell names a surface that gives the distance.

@@ -38,7 +38,7 @@ macro_rules! record {
 fn page_and_records_agree() {
     let page = include_str!("../../docs/scene-image.md");
     assert!(page.starts_with(&format!("# Scene image, layout {LAYOUT_VERSION}\n")));
-    record!(page, "Header", Header, magic layout length crc reserved parts shapes fields nodes points faces patches bricks palette grid blob edges spans);
+    record!(page, "Header", Header, magic layout length crc energies parts shapes fields nodes points faces patches bricks palette grid blob edges spans);
     record!(page, "Part", PartRecord, shape flags position orientation);
     record!(page, "Shape", ShapeRecord, field flags first_node node_count first_point point_count first_face face_count first_patch patch_count center radius volume center_of_mass inertia first_edge_node edge_node_count first_edge edge_count first_span span_count);
     record!(page, "Field", FieldRecord, origin cell scale band brick_dims format first_grid first_brick brick_count);
@@ -49,7 +49,11 @@ fn page_and_records_agree() {
     record!(page, "Face", FaceRecord, kind sense origin axis radius second);
     record!(page, "Edge", EdgeRecord, center half bend normals faces thickness edge radius);
     record!(page, "Patch", PatchRecord, origin x normal height radius face kind);
+    record!(page, "Energy block", EnergyBlock, energies charges nodes);
+    record!(page, "Energy record", EnergyRecord, moving fixed first_node first_charge charge_count origin step size reserved largest_force way across along turning);
+    record!(page, "Charge", ChargeRecord, at charge);
     for limit in [
+        ENERGY_DEPTHS,
         BRICK_CELLS,
         BRICK_SAMPLES,
         GridEntry::MAX_BRICKS,

@@ -7,6 +7,7 @@ use scene::Aligned;
 
 const GOLDEN: &[u8] = include_bytes!("golden/tiny.scene");
 const GOLDEN_OCCUPANCY: &[u8] = include_bytes!("golden/occupancy.scene");
+const GOLDEN_ENERGY: &[u8] = include_bytes!("golden/energy.scene");
 
 /// This test fails on a change of layout or meaning. Increment `LAYOUT_VERSION`, then rewrite the file with `MORTISE_BLESS=1`.
 #[test]
@@ -14,6 +15,7 @@ fn golden_bytes_have_not_changed() {
     let all = [
         ("tiny", scene::bytes(), GOLDEN),
         ("occupancy", scene::occupancy_bytes(), GOLDEN_OCCUPANCY),
+        ("energy", scene::energy_bytes(), GOLDEN_ENERGY),
     ];
     for (name, made, golden) in all {
         if std::env::var_os("MORTISE_BLESS").is_some() {

@@ -6,7 +6,7 @@ use mortise_protocol::image::SceneImage;
 use crate::baseline::explicit;
 use crate::collision::contact::Phase;
 use crate::collision::face_pairs::{Scenery, touching_faces};
-use crate::constraints::geometric_energy::{EnergyForce, EnergySituation};
+use crate::constraints::geometric_energy::{EnergyForce, EnergySituation, GeometricEnergy};
 use crate::constraints::saturating_spring::{SaturatingSpring, TargetForce};
 use crate::constraints::targets::{Situation, TargetRules};
 use crate::contact_step::{Constraints, Given, Reach, contact_step};
@@ -147,14 +147,7 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     let turning_j = grabbed.turning_energy(step.mass_kg, step.gyration2);
     hand.tank
         .keep(coupled.moving_j + turning_j, settings.passivity.initial_budget_j);
-    let energy = EnergySituation {
-        scene: given.scene,
-        parts: given.parts,
-        grabbed: &grabbed,
-        period_s,
-        length,
-    };
-    let energy = hand.energy.step(&energy, &settings.guidance);
+    let energy = energy_force(&mut hand.energy, given, &grabbed, &step);
     let guided = (TargetForce::new(&springs, period_s, length), energy);
     let coupled_force = CouplingForce::new(coupling, &settings.coupling, period_s, length);
     let constrained = (coupled_force, guided);
@@ -196,6 +189,23 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
         contact: solution.contact,
         guidance: guidance(hand, &springs, energy, &step.scale(twist), &step),
     })
+}
+
+/// Force of the scene's geometric energies in this tick.
+fn energy_force(
+    energy: &mut GeometricEnergy,
+    given: &Given<'_, '_>,
+    grabbed: &Grabbed,
+    step: &Step,
+) -> Option<EnergyForce> {
+    let situation = EnergySituation {
+        scene: given.scene,
+        parts: given.parts,
+        grabbed,
+        period_s: step.period_s,
+        length: step.length,
+    };
+    energy.step(&situation, &given.settings.guidance)
 }
 
 /// What guides, for telemetry: targets and geometric energies together, once the twist `x` has acted.

@@ -35,7 +35,7 @@ pub(crate) fn scene() -> Vec<u8> {
         u32::from_le_bytes([image[at], image[at + 1], image[at + 2], image[at + 3]])
     };
     let size = size_of::<PartRecord>();
-    // The parts' section is the first of all: its place in the header comes after magic, layout, length, checksum and a reserved word.
+    // The parts' section is the first of all: its place in the header comes after magic, layout, length, checksum and the place of energies.
     let first = word(&image, 24) as usize;
     let mut fixed = image[first..first + size].to_vec();
     // After its shape, flags and x, y.

@@ -35,12 +35,12 @@ pub enum ImageError {
     Misaligned,
     /// A section lies outside the image or overlaps the header.
     Section {
-        /// Position in the header's list, from 0.
+        /// Position in the header's list, from 0; energies, their charges and their nodes are 13, 14 and 15.
         section: u8,
     },
     /// A record refers to something outside the image, or contains an impossible number.
     Record {
-        /// Position of its section in the header's list, from 0.
+        /// Position of its section, as above.
         section: u8,
         /// Index of the record.
         index: u32,

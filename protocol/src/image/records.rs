@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// First eight bytes of every scene image.
 pub const MAGIC: [u8; 8] = *b"MORTISE\0";
-/// Version of this layout. Any change to a record or its meaning increments it.
+/// Version of this layout. A change that an older reader would misread increments it; what an older reader passes over does not.
 pub const LAYOUT_VERSION: u32 = 5;
 /// Cells along a brick's edge.
 pub const BRICK_CELLS: usize = 8;

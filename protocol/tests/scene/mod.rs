@@ -427,6 +427,64 @@ pub fn finer_bytes() -> Vec<u8> {
     .image()
 }
 
+/// The scene of [`bytes`] with two geometric energies behind it: [`energies`].
+pub fn energy_bytes() -> Vec<u8> {
+    let (records, charges, nodes) = energies();
+    let mut bytes = bytes();
+    let at = bytes.len();
+    bytes.resize(at + size_of::<EnergyBlock>(), 0);
+    let block = EnergyBlock {
+        energies: section(&mut bytes, &records),
+        charges: section(&mut bytes, &charges),
+        nodes: section(&mut bytes, &nodes),
+    };
+    bytes[at..at + size_of::<EnergyBlock>()].copy_from_slice(bytes_of(&block));
+    let length = bytes.len() as u32;
+    let header: &mut Header = bytemuck::from_bytes_mut(&mut bytes[..size_of::<Header>()]);
+    (header.energies, header.length) = (at as u32, length);
+    let crc = CRC.checksum(&bytes[20..]);
+    bytes[16..20].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+/// Part 1 in a lattice of 4 × 3 × 2 nodes of part 0, 2 mm apart, with three charges; part 2 in the same lattice's first two layers, with none.
+pub fn energies() -> (Vec<EnergyRecord>, Vec<ChargeRecord>, Vec<[i8; 2]>) {
+    let first = EnergyRecord {
+        moving: 1,
+        fixed: 0,
+        first_node: 0,
+        first_charge: 0,
+        charge_count: 3,
+        origin: [-0.001, 0.002, 0.004],
+        step: 0.002,
+        size: [4, 3, 2],
+        reserved: 0,
+        largest_force: 250.0,
+        way: [0.0, 0.6, 0.8],
+        across: core::array::from_fn(|i| 1e5 * i as f32),
+        along: core::array::from_fn(|i| 1e4 * i as f32 + 7.0),
+        turning: core::array::from_fn(|i| 10.0 + i as f32),
+    };
+    let second = EnergyRecord {
+        moving: 2,
+        first_charge: 3,
+        charge_count: 0,
+        size: [2, 2, 2],
+        ..first
+    };
+    let charge = |at: [f32; 3], charge: [f32; 2]| ChargeRecord { at, charge };
+    let charges = vec![
+        charge([0.0, 0.001, 0.002], [0.01, 0.0]),
+        charge([-0.003, 0.0, 0.0], [0.0, -0.02]),
+        charge([0.0, 0.0, 0.005], [0.003, 0.004]),
+    ];
+    // No two nodes are equal, both ends of i8 among them.
+    let nodes = (0..24i32)
+        .map(|i| [(11 * i - 128).min(127) as i8, (127 - 7 * i) as i8])
+        .collect();
+    (vec![first, second], charges, nodes)
+}
+
 struct Sections<'a> {
     parts: &'a [PartRecord],
     shapes: &'a [ShapeRecord],

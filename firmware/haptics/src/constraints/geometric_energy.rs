@@ -9,7 +9,7 @@
 //! with δ the displacement from X₀. K is the writer's majoriser at that depth, so m(δ) ≥ E(X): the next round starts at an energy no higher than the
 //! model's, and replacing one by the other makes no energy. The wrench w₀ − K·δ of the model is linear, and K positive semi-definite, so it enters the
 //! implicit step as it is. Where K·δ would exceed the largest force (a hand that moves the part faster than rounds follow), X₀ is dragged along, which
-//! takes energy.
+//! takes energy. Where no charge is in the lattice, neither force nor stiffness acts. The engagement rises from the first whole round on, in 256 ticks.
 //!
 //! The energy finds and does not hold: interior overlap is left to contact, and a fit that is to be held to micrometres to targets. Its method is chosen
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
@@ -40,7 +40,7 @@ pub(crate) struct GeometricEnergy {
     /// Rises from 0 to 1 with the method, and falls again.
     engagement: f32,
     round: Round,
-    /// Result of the last whole round.
+    /// Result of the last whole round, if an energy moves the held part.
     found: Option<Model>,
 }
 
@@ -52,12 +52,14 @@ struct Round {
     object: Pose,
     center: Vec3,
     /// Number of the energy, and of its charge, that comes next.
-    energy: u16,
+    energy: u32,
     charge: u32,
     /// Of that energy's charges: energy, force and torque in the fixed part's frame, for unit depth.
     sum: Sum,
     /// Of the energies before it.
     model: Model,
+    /// Whether there was one of the held part among them.
+    acts: bool,
 }
 
 /// Energy, force times the lattice's step and torque about the centre of mass, for unit depth.
@@ -66,6 +68,8 @@ struct Sum {
     energy: f32,
     force: Vec3,
     torque: Vec3,
+    /// Whether any charge is in the lattice.
+    acts: bool,
 }
 
 impl Sum {
@@ -73,6 +77,7 @@ impl Sum {
         energy: 0.0,
         force: Vec3::ZERO,
         torque: Vec3::ZERO,
+        acts: false,
     };
 }
 
@@ -155,8 +160,12 @@ impl Model {
         }
     }
 
-    /// Adds an energy whose charges are all summed.
+    /// Adds an energy whose charges are all summed. Where none of them is in the lattice the energy is zero all about, and needs no majoriser: its
+    /// stiffness would only drag a part that is far from its fit.
     fn add(&mut self, energy: &Energy<'_>, sum: &Sum, fixed: &Pose) {
+        if !sum.acts {
+            return;
+        }
         let record = energy.record;
         // Joules of depth for a largest force of 1 N.
         let depth_j = 1.0 / record.largest_force;
@@ -183,7 +192,8 @@ impl Model {
 /// Entry of a table over depths from 0 to 1, linear between entries.
 fn interpolated(row: &[f32; ENERGY_DEPTHS], depth: f32) -> f32 {
     let last = ENERGY_DEPTHS - 1;
-    let at = smaller(larger(depth, 0.0), 1.0) * last as f32;
+    // In this order what is not a number becomes 0.
+    let at = smaller(1.0, larger(0.0, depth)) * last as f32;
     let below = (at as usize).min(last - 1);
     let share = at - below as f32;
     row[below] + share * (row[below + 1] - row[below])
@@ -216,6 +226,7 @@ impl GeometricEnergy {
                 charge: 0,
                 sum: Sum::ZERO,
                 model: Model::NONE,
+                acts: false,
             },
             found: None,
         }
@@ -237,18 +248,19 @@ impl GeometricEnergy {
     pub fn step(&mut self, at: &EnergySituation<'_, '_>, settings: &GuidanceSettings) -> Option<EnergyForce> {
         let is_on = settings.method == GuidanceMethod::Energy && at.scene.energy_count() > 0;
         if !is_on && self.engagement == 0.0 {
+            self.clear();
             return None;
         }
-        self.engagement = if is_on {
+        self.sum(at);
+        // Not before there is a model: none of the force arrives at once, and without an energy of the held part nothing guides.
+        self.engagement = if is_on && self.found.is_some() {
             smaller(self.engagement + STEP, 1.0)
         } else {
             larger(self.engagement - STEP, 0.0)
         };
         if self.engagement == 0.0 {
-            self.clear();
             return None;
         }
-        self.sum(at);
         let model = self.found.as_mut()?;
         model.drag(at.grabbed, at.length);
         let largest_n = self.engagement * settings.geometric_force_n;
@@ -281,12 +293,13 @@ impl GeometricEnergy {
                     orientation: grabbed.orientation,
                     ..Model::NONE
                 },
+                acts: false,
             };
         }
         let mut left = CHARGES_PER_TICK;
         while left > 0 {
-            let Some(energy) = at.scene.energy(usize::from(round.energy)) else {
-                self.found = Some(round.model);
+            let Some(energy) = at.scene.energy(round.energy as usize) else {
+                self.found = round.acts.then_some(round.model);
                 round.running = false;
                 return;
             };
@@ -306,6 +319,7 @@ impl GeometricEnergy {
             if now == charges.len() {
                 let sum = round.sum;
                 round.model.add(&energy, &sum, &fixed.pose);
+                round.acts = true;
                 round.sum = Sum::ZERO;
                 round.charge = 0;
                 round.energy += 1;
@@ -336,6 +350,7 @@ impl Round {
                 continue;
             };
             let force = Vec3::from_array(slope);
+            sum.acts = true;
             sum.energy -= value;
             sum.force += force;
             sum.torque += (place - center).cross(force);

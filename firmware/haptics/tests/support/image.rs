@@ -33,10 +33,56 @@ pub struct Writer {
 /// Finished bytes, aligned to 4.
 pub struct Image(Vec<u32>);
 
+/// A geometric energy: its record, whose numbers of nodes and charges the image states, and its arrays.
+#[derive(Clone)]
+pub struct EnergyParts {
+    pub record: EnergyRecord,
+    pub charges: Vec<ChargeRecord>,
+    pub nodes: Vec<[i8; 2]>,
+}
+
 impl Image {
     /// The image as written to flash.
     pub fn bytes(&self) -> &[u8] {
         cast_slice(&self.0)
+    }
+
+    /// The image with these geometric energies behind it, and the rest as it is.
+    pub fn with_energies(&self, energies: &[EnergyParts]) -> Self {
+        let mut bytes = self.bytes().to_vec();
+        let (mut records, mut charges, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
+        for energy in energies {
+            records.push(EnergyRecord {
+                first_node: nodes.len() as u32,
+                first_charge: charges.len() as u32,
+                charge_count: energy.charges.len() as u32,
+                ..energy.record
+            });
+            charges.extend_from_slice(&energy.charges);
+            nodes.extend_from_slice(&energy.nodes);
+        }
+        let at = bytes.len();
+        bytes.resize(at + size_of::<EnergyBlock>(), 0);
+        let block = EnergyBlock {
+            energies: section(&mut bytes, &records),
+            charges: section(&mut bytes, &charges),
+            nodes: section(&mut bytes, &nodes),
+        };
+        bytes[at..at + size_of::<EnergyBlock>()].copy_from_slice(bytes_of(&block));
+        pad(&mut bytes);
+        let mut header = *self.open().header();
+        header.energies = at as u32;
+        Self::seal(bytes, header)
+    }
+
+    /// With this header, its length and its checksum.
+    fn seal(mut bytes: Vec<u8>, mut header: Header) -> Self {
+        header.length = bytes.len() as u32;
+        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+        header.crc = CRC.checksum(&bytes[20..]);
+        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+        let words = bytes.chunks_exact(4);
+        Self(words.map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect())
     }
 
     pub fn open(&self) -> SceneImage<'_> {
@@ -326,16 +372,7 @@ impl Writer {
         header.edges = section::<EdgeRecord>(&mut bytes, &[]);
         header.spans = section::<SpanRecord>(&mut bytes, &[]);
         pad(&mut bytes);
-        header.length = bytes.len() as u32;
-        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
-        header.crc = CRC.checksum(&bytes[20..]);
-        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
-        Image(
-            bytes
-                .chunks_exact(4)
-                .map(|b| u32::from_le_bytes(b.try_into().unwrap()))
-                .collect(),
-        )
+        Image::seal(bytes, header)
     }
 }
 

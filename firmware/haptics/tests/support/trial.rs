@@ -20,12 +20,12 @@ const SUBSTEPS: u32 = 10;
 /// Time constant of the speed filter behind counting encoders, s.
 const FILTER_S: f64 = 3e-3;
 /// Encoder counts: m and rad.
-const COUNT_M: f64 = 5e-6;
-const COUNT_RAD: f64 = TAU / 65_536.0;
+pub const COUNT_M: f64 = 5e-6;
+pub const COUNT_RAD: f64 = TAU / 65_536.0;
 
 /// SplitMix64.
 #[derive(Clone, Debug)]
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
     fn next(&mut self) -> u64 {
@@ -40,24 +40,24 @@ impl Random {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
     /// Log-uniform.
-    fn decade(&mut self, low: f64, high: f64) -> f64 {
+    pub fn decade(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.unit())
     }
 
-    fn below(&mut self, n: u64) -> u64 {
+    pub fn below(&mut self, n: u64) -> u64 {
         self.next() % n
     }
 
-    fn chance(&mut self, p: f64) -> bool {
+    pub fn chance(&mut self, p: f64) -> bool {
         self.unit() < p
     }
 
-    fn direction(&mut self) -> DVec3 {
+    pub fn direction(&mut self) -> DVec3 {
         loop {
             let v = DVec3::from_array([(); 3].map(|()| self.within(-1.0, 1.0)));
             if (0.01..1.0).contains(&v.length_squared()) {
@@ -78,9 +78,10 @@ pub enum Hold {
 
 /// Operator model.
 #[derive(Clone, Debug)]
-struct Operator {
-    hold: Hold,
-    at: Place,
+pub struct Operator {
+    pub hold: Hold,
+    /// True placement of the handle.
+    pub at: Place,
     velocity: DVec3,
     angular: DVec3,
     from: [DVec3; 2],
@@ -90,15 +91,15 @@ struct Operator {
     tremor: (f64, f64),
     /// Start of its paths.
     start: Place,
-    moving: bool,
+    pub moving: bool,
     /// Largest distance from the start, m.
     range: f64,
     /// Readings and filtered speeds of counting encoders, if it has them.
-    readings: Option<(Place, Twist)>,
+    pub readings: Option<(Place, Twist)>,
 }
 
 impl Operator {
-    fn new(random: &mut Random, start: Place, range: f64) -> Self {
+    pub fn new(random: &mut Random, start: Place, range: f64) -> Self {
         let hold = if random.chance(0.3) {
             Hold::Position
         } else {
@@ -151,7 +152,7 @@ impl Operator {
     }
 
     /// Starts another path.
-    fn choose(&mut self, random: &mut Random, t: u32) {
+    pub fn choose(&mut self, random: &mut Random, t: u32) {
         if !self.moving || t < self.begun + self.ticks {
             return;
         }
@@ -166,7 +167,7 @@ impl Operator {
         }
     }
 
-    fn input(&mut self, period: f64) -> Input {
+    pub fn input(&mut self, period: f64) -> Input {
         let exact = Twist {
             linear: self.velocity.as_vec3(),
             angular: self.angular.as_vec3(),
@@ -198,7 +199,7 @@ impl Operator {
         }
     }
 
-    fn advance(&mut self, wrench: &Wrench, t: u32, period: f64) {
+    pub fn advance(&mut self, wrench: &Wrench, t: u32, period: f64) {
         let h = period / f64::from(SUBSTEPS);
         let (force, torque) = (wrench.force.as_dvec3(), wrench.torque.as_dvec3());
         match self.hold {
