@@ -47,7 +47,7 @@ pub fn bytes(energies: &[Placed]) -> usize {
 /// # Errors
 /// [`AttachError`]; an image is never half written.
 pub fn attach(image: &[u8], energies: &[Placed]) -> Result<Vec<u8>, AttachError> {
-    let mut header = *SceneImage::open(image)?.header();
+    let mut header = *SceneImage::open(cast_slice(&aligned(image)))?.header();
     if header.energies != 0 {
         return Err(AttachError::Present);
     }
@@ -96,10 +96,14 @@ pub fn attach(image: &[u8], energies: &[Placed]) -> Result<Vec<u8>, AttachError>
     let crc_at = offset_of!(Header, crc);
     bytes[crc_at..crc_at + 4].copy_from_slice(&crc.to_le_bytes());
     // Of the caller's part numbers nothing is known before.
-    let words: Vec<u32> = bytes
-        .chunks_exact(4)
-        .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))
-        .collect();
-    SceneImage::open(cast_slice(&words))?;
+    SceneImage::open(cast_slice(&aligned(&bytes)))?;
     Ok(bytes)
+}
+
+/// The bytes as words, aligned as a reader needs them; bytes beyond the last word are no image's.
+fn aligned(bytes: &[u8]) -> Vec<u32> {
+    bytes
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+        .collect()
 }

@@ -24,7 +24,7 @@ use crate::density::Density;
 const CHARGES: usize = 384;
 const NODES: usize = 12_400;
 /// Places at which the moving part's density is looked at for its charges, about: several sets, of which one is kept.
-const PLACES: [f64; 4] = [6000.0, 5000.0, 4000.0, 3000.0];
+const PLACES: [f64; 2] = [6000.0, 4000.0];
 /// Margin about the moving part in which it has charges, mm.
 const MARGIN_MM: f64 = 4.0;
 /// How far from the mating faces it has charges, mm.
@@ -57,6 +57,11 @@ const RISE_SHARE: f64 = 0.3;
 const ON_WAY_WEIGHT: f64 = 1.0;
 const BESIDE_WEIGHT: f64 = 0.2;
 const RIDGE: f64 = 1e-3;
+/// Rounds of the fit, places of the way at which each looks for the least energy, the distance from the way that is let be, mm, and the weight of a pose found.
+const ROUNDS: usize = 6;
+const OFF_PLACES: usize = 40;
+const NEAR_MM: f64 = 0.05;
+const ROUND_WEIGHT: f64 = 60.0;
 /// Arm at which tilts count as displacements, mm, and the first step of the search for a minimum, mm.
 const TILT_ARM_MM: f64 = 10.0;
 const SEARCH_MM: f64 = 0.5;
@@ -118,19 +123,18 @@ impl BakedEnergy {
     /// Distance across the way (mm) and tilt (rad) of the least energy near a pose, which stays where it is along the way and in spin about it; by steps along the
     /// coordinates, from [`SEARCH_MM`] down to a micrometre.
     pub fn minimum(&self, pose: &DAffine3) -> (f64, f64) {
-        let axis = DVec3::from_array(self.record.way.map(f64::from));
-        let (u, v) = axis.any_orthonormal_pair();
-        let middle = pose.transform_point3(self.middle());
-        let of = |x: &[f64; 4]| {
-            let turn = (u * x[2] + v * x[3]) / TILT_ARM_MM;
-            let pose = moved(pose, u * x[0] + v * x[1], turn, middle);
-            self.at(&pose, DVec3::ZERO).energy
-        };
+        let at = self.lowest(pose, 4);
+        (at[0].hypot(at[1]), at[2].hypot(at[3]) / TILT_ARM_MM)
+    }
+
+    /// Displacement from a pose to the least energy near it: across the way, and in tilt times [`TILT_ARM_MM`]; of the first `free` of these coordinates.
+    fn lowest(&self, pose: &DAffine3, free: usize) -> [f64; 4] {
         let (mut at, mut step) = ([0.0; 4], SEARCH_MM);
+        let of = |x: &[f64; 4]| self.at(&self.beside(pose, x), DVec3::ZERO).energy;
         let mut value = of(&at);
         while step > 1e-3 {
             let before = value;
-            for k in 0..4 {
+            for k in 0..free {
                 for sign in [step, -step] {
                     let mut next = at;
                     next[k] += sign;
@@ -144,7 +148,19 @@ impl BakedEnergy {
                 step *= 0.5;
             }
         }
-        (at[0].hypot(at[1]), at[2].hypot(at[3]) / TILT_ARM_MM)
+        at
+    }
+
+    /// A pose displaced as [`Self::lowest`] states it.
+    fn beside(&self, pose: &DAffine3, x: &[f64; 4]) -> DAffine3 {
+        let (u, v) = DVec3::from_array(self.record.way.map(f64::from)).any_orthonormal_pair();
+        let turn = (u * x[2] + v * x[3]) / TILT_ARM_MM;
+        moved(
+            pose,
+            u * x[0] + v * x[1],
+            turn,
+            pose.transform_point3(self.middle()),
+        )
     }
 
     /// Energy as the board computes it, before its sums; `about` is the point in the fixed part's frame (mm) that rotations are about.
@@ -185,14 +201,13 @@ pub fn bake(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEne
     let (record, nodes) = lattice(fixed, zone, way)?;
     let of = |places: f64| {
         let samples = strongest(moving, zone, places);
-        let mut baked = BakedEnergy {
+        let baked = BakedEnergy {
             record,
             charges: Vec::new(),
             nodes: nodes.clone(),
             deviation: 0.0,
         };
-        fit(&mut baked, &samples, way)?;
-        Some((off_way(&baked, way), baked))
+        fit(&baked, &samples, way)
     };
     let all: Vec<(f64, BakedEnergy)> = PLACES.into_iter().filter_map(of).collect();
     let (_, mut best) = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -200,16 +215,24 @@ pub fn bake(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEne
     Some(best)
 }
 
-/// Largest distance of the least energy from the way over places on it, mm; tilts count as displacements at [`TILT_ARM_MM`].
-fn off_way(baked: &BakedEnergy, way: &Way<'_>) -> f64 {
-    let before = [0.0, 0.25, 0.5, 0.75].map(|share| share * way.length_mm);
-    let above = [1.0, 2.0, 5.0].map(|height| way.length_mm + height);
-    (before.into_par_iter().chain(above))
-        .map(|travel| {
-            let (aside, tilt) = baked.minimum(&(way.pose)(travel));
-            aside.max(TILT_ARM_MM * tilt)
+/// A place of the way and the displacement from there to the least energy near it.
+type Off = (f64, [f64; 4]);
+
+/// Where the least energy is off the way: over places on it, with tilts free and without.
+fn off_way(baked: &BakedEnergy, way: &Way<'_>) -> Vec<Off> {
+    let last = way.length_mm + FITTED_BEYOND_MM;
+    (0..2 * OFF_PLACES)
+        .into_par_iter()
+        .map(|i| {
+            let travel = last * (i / 2) as f64 / OFF_PLACES as f64;
+            (travel, baked.lowest(&(way.pose)(travel), 2 + 2 * (i % 2)))
         })
-        .reduce(|| 0.0, f64::max)
+        .collect()
+}
+
+/// Length of such a displacement, mm.
+fn distance(x: &[f64; 4]) -> f64 {
+    x[0].hypot(x[1]).max(x[2].hypot(x[3]))
 }
 
 /// A place of the moving part and its density there, less that beside a plane.
@@ -430,33 +453,77 @@ fn extent(samples: &[Sample], on_way: &[f64], pose: &DAffine3) -> (DVec3, f64) {
     (middle, squared.sqrt().max(WIDTH_MM))
 }
 
-/// Fits the charges. `None` where no charges have a well at the fit.
-fn fit(baked: &mut BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Option<()> {
+/// Fits the charges, again and again with the poses in which the least energy was found off the way; returns the best energy and how far it is off, mm. `None`
+/// where no charges have a well at the fit.
+fn fit(baked: &BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Option<(f64, BakedEnergy)> {
     let energy = Energy::new(&baked.record, &[], &baked.nodes)?;
+    let count = 2 * samples.len();
     let rows: Vec<Row> = (travels(way).into_par_iter().enumerate())
         .flat_map_iter(|(number, travel)| rows(&energy, samples, way, number, travel))
         .collect();
-    let matrix = DMatrix::from_fn(rows.len(), 2 * samples.len(), |i, j| rows[i].terms[j]);
+    let matrix = DMatrix::from_fn(rows.len(), count, |i, j| rows[i].terms[j]);
     let wanted = DVector::from_fn(rows.len(), |i, _| rows[i].value);
-    let mut normal = matrix.tr_mul(&matrix);
-    let ridge = RIDGE * normal.trace() / normal.nrows() as f64;
-    for i in 0..normal.nrows() {
+    let (mut normal, mut right) = (matrix.tr_mul(&matrix), matrix.tr_mul(&wanted));
+    let ridge = RIDGE * normal.trace() / count as f64;
+    for i in 0..count {
         normal[(i, i)] += ridge;
     }
-    let fitted = normal.cholesky()?.solve(&matrix.tr_mul(&wanted));
-    let left = &wanted - &matrix * &fitted;
-    let beside: Vec<f64> = (rows.iter().zip(left.iter()).enumerate())
-        .filter(|(i, _)| i % (ON_WAY_ROWS + BESIDE) >= ON_WAY_ROWS)
-        .map(|(_, (row, left))| left / row.weight)
-        .collect();
-    baked.deviation = (beside.iter().map(|v| v * v).sum::<f64>() / beside.len() as f64).sqrt();
-    baked.charges = (samples.iter().zip(fitted.as_slice().chunks_exact(2)))
-        .map(|((at, _), q)| ChargeRecord {
-            at: (*at * M_PER_MM).as_vec3().to_array(),
-            charge: [q[0] as f32, q[1] as f32],
-        })
-        .collect();
-    // The depth at the fit is 1 to the last digit.
+    let mut best: Option<(f64, BakedEnergy)> = None;
+    for _ in 0..ROUNDS {
+        let fitted = normal.clone().cholesky()?.solve(&right);
+        let left = &wanted - &matrix * &fitted;
+        let beside = (rows.iter().zip(left.iter()).enumerate())
+            .filter(|(i, _)| i % (ON_WAY_ROWS + BESIDE) >= ON_WAY_ROWS)
+            .map(|(_, (row, left))| (left / row.weight).powi(2));
+        let count = beside.clone().count() as f64;
+        let Some(now) = with_charges(
+            baked,
+            samples,
+            fitted.as_slice(),
+            way,
+            (beside.sum::<f64>() / count).sqrt(),
+        ) else {
+            break;
+        };
+        let off = off_way(&now, way);
+        let worst = off.iter().map(|(_, x)| distance(x)).fold(0.0, f64::max);
+        for (travel, x) in off.iter().filter(|(_, x)| distance(x) > NEAR_MM) {
+            let pose = (way.pose)(*travel);
+            let [on, beside] = [pose, now.beside(&pose, x)].map(|pose| terms(&energy, samples, &pose));
+            let row = DVector::from_iterator(
+                on.len(),
+                beside.iter().zip(&on).map(|(b, a)| ROUND_WEIGHT * (b - a)),
+            );
+            let height = ((way.length_mm + BEYOND_MM - travel) / (way.length_mm + BEYOND_MM)).max(0.0);
+            let value = ROUND_WEIGHT * height * rise(distance(x) / WIDTH_MM);
+            normal.ger(1.0, &row, &row, 1.0);
+            right.axpy(value, &row, 1.0);
+        }
+        if best.as_ref().is_none_or(|(least, _)| worst < *least) {
+            best = Some((worst, now));
+        }
+    }
+    best
+}
+
+/// The energy with these charges, scaled so that its depth at the fit is 1; `None` where it has no well there.
+fn with_charges(
+    baked: &BakedEnergy,
+    samples: &[Sample],
+    fitted: &[f64],
+    way: &Way<'_>,
+    deviation: f64,
+) -> Option<BakedEnergy> {
+    let mut baked = BakedEnergy {
+        deviation,
+        charges: (samples.iter().zip(fitted.chunks_exact(2)))
+            .map(|((at, _), q)| ChargeRecord {
+                at: (*at * M_PER_MM).as_vec3().to_array(),
+                charge: [q[0] as f32, q[1] as f32],
+            })
+            .collect(),
+        ..baked.clone()
+    };
     let depth = -baked.at(&(way.pose)(0.0), DVec3::ZERO).energy;
     if depth <= 0.0 {
         return None;
@@ -464,7 +531,7 @@ fn fit(baked: &mut BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Option<()>
     for charge in &mut baked.charges {
         charge.charge = charge.charge.map(|q| (f64::from(q) / depth) as f32);
     }
-    Some(())
+    Some(baked)
 }
 
 /// A pose beside the way: its depth on the scale of the tables, its force, and how much displacements from it exceed the linear model.

@@ -11,6 +11,7 @@ use mortise_bake::{
 };
 use mortise_output::{Existing, Output, lines};
 
+use super::energies;
 use super::reading::Reading;
 use super::units;
 use crate::folder_cache::FolderCache;
@@ -66,6 +67,9 @@ pub struct Args {
     /// Part that may be grabbed, by name; repeatable [default: all but the largest]
     #[arg(long, value_name = "NAME")]
     grabbable: Vec<String>,
+    /// Geometric energy that draws a part to its fit in another one, MOVING:AGAINST by name, 32 KiB each; repeatable
+    #[arg(long, value_name = "PAIR", value_parser = energies::names)]
+    energy: Vec<energies::Names>,
     /// Neither use nor keep results of earlier bakes
     #[arg(long)]
     no_cache: bool,
@@ -89,7 +93,7 @@ impl Args {
     }
 
     /// The image described, where one is.
-    fn explicit(&self) -> Option<BakeOptions> {
+    fn explicit(&self, energy_bytes: u64) -> Option<BakeOptions> {
         let described = self.cell.is_some() || self.method.is_some() || self.shell.is_some();
         described.then(|| BakeOptions {
             method: self.method.unwrap_or_default(),
@@ -101,17 +105,18 @@ impl Args {
                 },
                 _ => PointshellKind::ErrorBounded,
             },
-            image_limit_bytes: self.flash.unwrap_or(mortise_bake::SLOT_BYTES),
+            image_limit_bytes: (self.flash.unwrap_or(mortise_bake::SLOT_BYTES)).saturating_sub(energy_bytes),
             grabbable: self.grabbable(),
             ..BakeOptions::default()
         })
     }
 
-    fn request(&self) -> Request {
+    /// What is planned for, with room left for the energies.
+    fn request(&self, energy_bytes: u64) -> Request {
         let asked = Request::default();
         Request {
             accuracy_mm: self.accuracy.unwrap_or(asked.accuracy_mm),
-            flash_bytes: self.flash.unwrap_or(asked.flash_bytes),
+            flash_bytes: (self.flash.unwrap_or(asked.flash_bytes)).saturating_sub(energy_bytes),
             tick_instructions: self.tick,
             grabbable: self.grabbable(),
         }
@@ -139,17 +144,24 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ControlFlow::Continue(())
     };
     let in_file = || args.file.display().to_string();
-    let Some(options) = args.explicit() else {
-        let result = mortise_bake::plan_with(&model, &args.request(), cache, &progress);
+    let found = energies::of(&model, &args.energy).with_context(in_file)?;
+    let energy_bytes = energies::bytes(&found);
+    let Some(options) = args.explicit(energy_bytes) else {
+        let request = args.request(energy_bytes);
+        let result = mortise_bake::plan_with(&model, &request, cache, &progress);
         clear(terminal);
         warn_of(folder.as_ref());
-        let planned = result.with_context(in_file)?;
-        return print_plan(args, &target, &args.request(), &planned, &model.warnings).with_context(in_file);
+        let mut planned = result.with_context(in_file)?;
+        if planned.fits {
+            planned.image = energies::attach(planned.image, &mut planned.plan.report, &found, &model)?;
+        }
+        return print_plan(args, &target, &request, &planned, &model.warnings).with_context(in_file);
     };
     let result = mortise_bake::bake(&model, &options, &progress);
     clear(terminal);
     warn_of(folder.as_ref());
-    let baked = result.with_context(in_file)?;
+    let mut baked = result.with_context(in_file)?;
+    baked.image = energies::attach(baked.image, &mut baked.report, &found, &model)?;
     target.write(&baked.image)?;
     if args.json {
         lines::json(&baked.report)?;

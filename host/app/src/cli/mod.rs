@@ -9,6 +9,7 @@ mod bake;
 mod clearance;
 mod contacts;
 mod demo;
+mod energies;
 mod fit;
 mod inspect;
 mod lab;

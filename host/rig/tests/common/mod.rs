@@ -33,7 +33,7 @@ pub fn image(filling: usize, seed: u8) -> Vec<u8> {
         layout: LAYOUT_VERSION,
         length: length as u32,
         crc: 0,
-        reserved: 0,
+        energies: 0,
         parts: none,
         shapes: none,
         fields: none,

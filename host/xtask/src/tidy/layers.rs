@@ -81,7 +81,13 @@ const LAYERS: &[(&str, &[&str])] = &[
     ),
     (
         "host/energy",
-        &["mortise-bake", "mortise-brep", "mortise-fit", "mortise-protocol"],
+        &[
+            "mortise-bake",
+            "mortise-brep",
+            "mortise-fit",
+            "mortise-protocol",
+            "mortise-shapes",
+        ],
     ),
     ("host/shapes", &[]),
     ("host/flash", &["mortise-protocol"]),
@@ -134,6 +140,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         &[
             "mortise-bake",
             "mortise-brep",
+            "mortise-energy",
             "mortise-fit",
             "mortise-flash",
             "mortise-guide",
