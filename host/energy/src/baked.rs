@@ -19,6 +19,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::density::Density;
+use crate::stiffness;
 
 /// Charges of an energy, and nodes of its lattice at most: together 31.9 KiB.
 const CHARGES: usize = 384;
@@ -38,7 +39,7 @@ const FITTED_BEYOND_MM: f64 = 8.0;
 /// r: displacement across the way at which the energy has risen by 0.3 of its depth there, mm.
 const WIDTH_MM: f64 = 1.5;
 /// Largest displacement beside the way for which the energy is fitted, mm, and the rotation, as a displacement at the distance L.
-const ASIDE_MM: f64 = 5.0;
+pub(crate) const ASIDE_MM: f64 = 5.0;
 const TURNED_MM: f64 = 3.0;
 /// Share of spin about the way in it: of round parts it changes nothing.
 const SPIN_SHARE: f64 = 0.3;
@@ -65,16 +66,8 @@ const ROUND_WEIGHT: f64 = 60.0;
 /// Arm at which tilts count as displacements, mm, and the first step of the search for a minimum, mm.
 const TILT_ARM_MM: f64 = 10.0;
 const SEARCH_MM: f64 = 0.5;
-/// Poses at which the stiffness is sampled, the largest displacement from each, mm, and rotation, rad; and the excess that is none, over the depth.
-const STIFFNESS_POSES: usize = 3000;
-const STIFFNESS_MM: f64 = 0.8;
-const STIFFNESS_RAD: f64 = 0.03;
-const STIFFNESS_SLACK: f64 = 1e-4;
-/// Largest factor on stiffness for displacements and rotations at once.
-const MOST_COUPLED: f64 = 3.0;
-
 /// Lengths in the image are in metres.
-const M_PER_MM: f64 = 1e-3;
+pub(crate) const M_PER_MM: f64 = 1e-3;
 
 /// The motion by which the moving part reaches its fit, relative to the fixed part.
 pub struct Way<'a> {
@@ -211,7 +204,7 @@ pub fn bake(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEne
     };
     let all: Vec<(f64, BakedEnergy)> = PLACES.into_iter().filter_map(of).collect();
     let (_, mut best) = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    majorise(&mut best, way, moving.center_of_mass());
+    stiffness::majorise(&mut best, way, moving.center_of_mass());
     Some(best)
 }
 
@@ -270,7 +263,7 @@ fn strongest(moving: &Density, [low, high]: [DVec3; 2], places: f64) -> Vec<Samp
 }
 
 /// Travels from the fit to where the fit of the charges ends, mm.
-fn travels(way: &Way<'_>) -> Vec<f64> {
+pub(crate) fn travels(way: &Way<'_>) -> Vec<f64> {
     let last = way.length_mm + FITTED_BEYOND_MM;
     let count = (last / PLACE_STEP_MM).ceil().clamp(20.0, 120.0) as usize;
     (0..=count).map(|i| last * i as f64 / count as f64).collect()
@@ -345,10 +338,10 @@ fn lattice(fixed: &Density, zone: [DVec3; 2], way: &Way<'_>) -> Option<(EnergyRe
 }
 
 /// Numbers from −1 to 1, the same in every run.
-struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -356,13 +349,13 @@ impl Numbers {
         (self.0 >> 33) as f64 / f64::from(1u32 << 30) - 1.0
     }
 
-    fn vector(&mut self) -> DVec3 {
+    pub(crate) fn vector(&mut self) -> DVec3 {
         DVec3::new(self.next(), self.next(), self.next())
     }
 }
 
 /// A pose moved by `by` and turned by the rotation vector `turn` about `about`.
-fn moved(pose: &DAffine3, by: DVec3, turn: DVec3, about: DVec3) -> DAffine3 {
+pub(crate) fn moved(pose: &DAffine3, by: DVec3, turn: DVec3, about: DVec3) -> DAffine3 {
     DAffine3::from_translation(about + by)
         * DAffine3::from_quat(DQuat::from_scaled_axis(turn))
         * DAffine3::from_translation(-about)
@@ -532,99 +525,4 @@ fn with_charges(
         charge.charge = charge.charge.map(|q| (f64::from(q) / depth) as f32);
     }
     Some(baked)
-}
-
-/// A pose beside the way: its depth on the scale of the tables, its force, and how much displacements from it exceed the linear model.
-struct Beside {
-    depth: f64,
-    force: f64,
-    /// Displacement, rotation vector, and twice the excess: across the way, along it, in rotation, and all at once.
-    excess: [(DVec3, DVec3, f64); 4],
-}
-
-impl Beside {
-    fn random(seed: u64, baked: &BakedEnergy, pose: &DAffine3, center_of_mass: DVec3) -> Self {
-        let mut numbers = Numbers(seed);
-        let axis = DVec3::from_array(baked.record.way.map(f64::from));
-        let share = 0.5 + 0.5 * numbers.next();
-        let middle = pose.transform_point3(center_of_mass);
-        let by = numbers.vector() * (ASIDE_MM * share);
-        let pose = moved(pose, by, numbers.vector() * (0.15 * share), middle);
-        let about = pose.transform_point3(center_of_mass);
-        let here = baked.at(&pose, about);
-        let excess = [0, 1, 2, 3].map(|family| {
-            let size = 0.55 + 0.45 * numbers.next();
-            let by = numbers.vector().normalize_or_zero() * (STIFFNESS_MM * size);
-            let turn = numbers.vector().normalize_or_zero() * (STIFFNESS_RAD * size);
-            let along = axis * axis.dot(by);
-            let (by, turn) = match family {
-                0 => (by - along, DVec3::ZERO),
-                1 => (along, DVec3::ZERO),
-                2 => (DVec3::ZERO, turn),
-                _ => (by, turn),
-            };
-            let there = baked.at(&moved(&pose, by, turn, about), about).energy;
-            let linear = here.slope.dot(by) + here.turn.dot(turn);
-            (by, turn, 2.0 * (there - here.energy - linear - STIFFNESS_SLACK))
-        });
-        Self {
-            depth: (-here.energy).clamp(0.0, 1.0) * (ENERGY_DEPTHS - 1) as f64,
-            force: here.slope.length(),
-            excess,
-        }
-    }
-
-    /// Entries of a table on either side of its depth, and the share of the second one.
-    fn entries(&self) -> ([usize; 2], f64) {
-        let below = self.depth.floor();
-        ([below as usize, self.depth.ceil() as usize], self.depth - below)
-    }
-}
-
-/// States the largest force, and the stiffness that majorises the energy at each depth.
-fn majorise(baked: &mut BakedEnergy, way: &Way<'_>, center_of_mass: DVec3) {
-    let axis = DVec3::from_array(baked.record.way.map(f64::from));
-    let travels = travels(way);
-    let this = &*baked;
-    let seen: Vec<Beside> = (0..STIFFNESS_POSES)
-        .into_par_iter()
-        .map(|i| {
-            let pose = (way.pose)(travels[i % travels.len()]);
-            Beside::random(0x5eed_0000 + i as u64, this, &pose, center_of_mass)
-        })
-        .collect();
-    let mut tables = [[0.0f64; ENERGY_DEPTHS]; 3];
-    for seen in &seen {
-        for (table, (by, turn, excess)) in tables.iter_mut().zip(seen.excess) {
-            let squared = (by.length_squared() + turn.length_squared()).max(f64::MIN_POSITIVE);
-            for entry in seen.entries().0 {
-                table[entry] = table[entry].max(excess / squared);
-            }
-        }
-    }
-    // Displacements of both kinds at once need more where translation and rotation are coupled.
-    let mut factors = [1.0f64; ENERGY_DEPTHS];
-    for seen in &seen {
-        let ([below, above], share) = seen.entries();
-        let at = |table: &[f64; ENERGY_DEPTHS]| table[below] + share * (table[above] - table[below]);
-        let (by, turn, excess) = seen.excess[3];
-        let along = axis.dot(by) * axis.dot(by);
-        let modelled = at(&tables[0]) * (by.length_squared() - along)
-            + at(&tables[1]) * along
-            + at(&tables[2]) * turn.length_squared();
-        for entry in [below, above] {
-            factors[entry] = factors[entry]
-                .max(excess / modelled.max(f64::MIN_POSITIVE))
-                .min(MOST_COUPLED);
-        }
-    }
-    let table =
-        |which: usize, unit: f64| core::array::from_fn(|i| (tables[which][i] * factors[i] * unit) as f32);
-    let per_mm2 = 1.0 / (M_PER_MM * M_PER_MM);
-    let record = &mut baked.record;
-    record.across = table(0, per_mm2);
-    record.along = table(1, per_mm2);
-    record.turning = table(2, 1.0);
-    let force = seen.iter().map(|seen| seen.force).fold(0.0, f64::max);
-    record.largest_force = (force / M_PER_MM).max(1.0) as f32;
 }

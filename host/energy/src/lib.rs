@@ -16,6 +16,7 @@ pub mod density;
 pub mod field;
 mod of_fit;
 pub mod pair;
+mod stiffness;
 
 pub use attach::{AttachError, Placed, attach, bytes};
 pub use baked::{BakedEnergy, Cost, Way, bake};

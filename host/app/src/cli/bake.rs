@@ -154,6 +154,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let mut planned = result.with_context(in_file)?;
         if planned.fits {
             planned.image = energies::attach(planned.image, &mut planned.plan.report, &found, &model)?;
+            return print_plan(args, &target, &args.request(0), &planned, &model.warnings)
+                .with_context(in_file);
+        }
+        if energy_bytes > 0 && !args.json {
+            lines::text(&format!(
+                "The energies take {energy_bytes} bytes, which leave {} for the model.",
+                request.flash_bytes
+            ))?;
         }
         return print_plan(args, &target, &request, &planned, &model.warnings).with_context(in_file);
     };
