@@ -14,12 +14,11 @@
 //! the board's implicit step needs.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use mortise_protocol::image::{ChargeRecord, ENERGY_DEPTHS, Energy, EnergyRecord};
+use mortise_protocol::image::{ChargeRecord, Energy, EnergyRecord};
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::density::Density;
-use crate::stiffness;
 
 /// Charges of an energy, and nodes of its lattice at most: together 31.9 KiB.
 const CHARGES: usize = 384;
@@ -185,11 +184,8 @@ fn look(energy: &Energy<'_>, pose: &DAffine3, at: DVec3, charge: [f32; 2]) -> Op
     Some((place, f64::from(value), slope))
 }
 
-/// Makes the energy of a moving part in a fixed one's density along a way. `None` where the two have no density for each other.
-///
-/// Where a minimum is, a few hundred places leave to chance: of several sets the one is kept whose minima are least off the way. Cost: about 8 s on two
-/// cores, most of it densities.
-pub fn bake(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEnergy> {
+/// The energy of a moving part in a fixed one's density along a way, without its stiffness; see [`crate::bake()`].
+pub(crate) fn best(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEnergy> {
     let zone = zone(moving, way.mating);
     let (record, nodes) = lattice(fixed, zone, way)?;
     let of = |places: f64| {
@@ -203,8 +199,7 @@ pub fn bake(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEne
         fit(&baked, &samples, way)
     };
     let all: Vec<(f64, BakedEnergy)> = PLACES.into_iter().filter_map(of).collect();
-    let (_, mut best) = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    stiffness::majorise(&mut best, way, moving.center_of_mass());
+    let (_, best) = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(best)
 }
 

@@ -11,6 +11,7 @@
 //! Units: millimetres, radians; energy in the unit of the scale that the caller gives.
 
 mod attach;
+mod bake;
 mod baked;
 pub mod density;
 pub mod field;
@@ -19,7 +20,8 @@ pub mod pair;
 mod stiffness;
 
 pub use attach::{AttachError, Placed, attach, bytes};
-pub use baked::{BakedEnergy, Cost, Way, bake};
+pub use bake::bake;
+pub use baked::{BakedEnergy, Cost, Way};
 pub use density::{Density, Kernel};
 pub use field::Field;
 pub use of_fit::of_fit;

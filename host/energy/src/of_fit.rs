@@ -6,7 +6,8 @@ use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, Shape};
 use mortise_fit::{Fit, Path, PathKind};
 
-use crate::baked::{BakedEnergy, Way, bake};
+use crate::bake::bake;
+use crate::baked::{BakedEnergy, Way};
 use crate::density::{Density, Kernel};
 
 /// The energy that draws part `moving` of `model` along the way in to its `fit` with part `against`. `None` where no way in is known, a part has no
