@@ -42,7 +42,7 @@ const TURNED_START_DEG: f64 = 2.0;
 /// Seconds of careless motion, four changes a second, and of each recording.
 const WANDER_S: f64 = 250.0;
 const WANDER_QUICK_S: f64 = 10.0;
-const RECORDING_S: f64 = 5.0;
+const RECORDING_S: f64 = 2.5;
 /// Lattice of the published form beside ours, mm, as `mortise-lab energy` has it.
 const PUBLISHED_MM: [f64; 2] = [2.5, 8.0];
 
@@ -353,7 +353,7 @@ fn careless(subject: &Subject, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Res
         Ok([outcome.energy_given_mj, at_part, f64::from(outcome.missed_ticks)])
     })?;
     let worst = |k: usize| seen.iter().map(|seen| seen[k]).fold(0.0, f64::max);
-    let motions = 4 * count * RECORDING_S as usize;
+    let motions = (4.0 * RECORDING_S * count as f64).round() as usize;
     let what = |row: &str| {
         format!(
             "board's energy, {}, {motions} random motions: {row}",
