@@ -113,7 +113,7 @@ impl BakedEnergy {
     }
 
     /// Distance across the way (mm) and tilt (rad) of the least energy near a pose, which stays where it is along the way and in spin about it; by steps along the
-    /// coordinates, from [`SEARCH_MM`] down to a micrometre.
+    /// coordinates, from half a millimetre down to a micrometre.
     pub fn minimum(&self, pose: &DAffine3) -> (f64, f64) {
         let at = self.lowest(pose, 4);
         (at[0].hypot(at[1]), at[2].hypot(at[3]) / TILT_ARM_MM)
