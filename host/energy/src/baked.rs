@@ -78,6 +78,19 @@ pub struct Way<'a> {
     pub pose: &'a (dyn Fn(f64) -> DAffine3 + Sync),
 }
 
+impl Way<'_> {
+    /// Travel from the fit to where the fit of the charges ends, mm.
+    fn fitted_mm(&self) -> f64 {
+        self.length_mm + FITTED_BEYOND_MM
+    }
+
+    /// Depth of the wanted energy at a travel from the fit: 1 there, 0 from [`BEYOND_MM`] beyond the way's begin on.
+    fn height(&self, travel_mm: f64) -> f64 {
+        let whole = self.length_mm + BEYOND_MM;
+        ((whole - travel_mm) / whole).max(0.0)
+    }
+}
+
 /// An energy that is ready for an image.
 #[derive(Clone, Debug)]
 pub struct BakedEnergy {
@@ -198,9 +211,8 @@ pub(crate) fn best(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<B
         };
         fit(&baked, &samples, way)
     };
-    let all: Vec<(f64, BakedEnergy)> = PLACES.into_iter().filter_map(of).collect();
-    let (_, best) = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(best)
+    let all = PLACES.into_iter().filter_map(of);
+    all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, best)| best)
 }
 
 /// A place of the way and the displacement from there to the least energy near it.
@@ -208,7 +220,7 @@ type Off = (f64, [f64; 4]);
 
 /// Where the least energy is off the way: over places on it, with tilts free and without.
 fn off_way(baked: &BakedEnergy, way: &Way<'_>) -> Vec<Off> {
-    let last = way.length_mm + FITTED_BEYOND_MM;
+    let last = way.fitted_mm();
     (0..2 * OFF_PLACES)
         .into_par_iter()
         .map(|i| {
@@ -259,7 +271,7 @@ fn strongest(moving: &Density, [low, high]: [DVec3; 2], places: f64) -> Vec<Samp
 
 /// Travels from the fit to where the fit of the charges ends, mm.
 pub(crate) fn travels(way: &Way<'_>) -> Vec<f64> {
-    let last = way.length_mm + FITTED_BEYOND_MM;
+    let last = way.fitted_mm();
     let count = (last / PLACE_STEP_MM).ceil().clamp(20.0, 120.0) as usize;
     (0..=count).map(|i| last * i as f64 / count as f64).collect()
 }
@@ -349,8 +361,8 @@ impl Numbers {
     }
 }
 
-/// A pose moved by `by` and turned by the rotation vector `turn` about `about`.
-pub(crate) fn moved(pose: &DAffine3, by: DVec3, turn: DVec3, about: DVec3) -> DAffine3 {
+/// A pose moved by `by` and turned by the rotation vector `turn` (rad) about `about`; lengths in the poses' unit.
+pub fn moved(pose: &DAffine3, by: DVec3, turn: DVec3, about: DVec3) -> DAffine3 {
     DAffine3::from_translation(about + by)
         * DAffine3::from_quat(DQuat::from_scaled_axis(turn))
         * DAffine3::from_translation(-about)
@@ -386,7 +398,7 @@ fn rows(energy: &Energy<'_>, samples: &[Sample], way: &Way<'_>, number: usize, t
     let pose = (way.pose)(travel);
     let on_way = terms(energy, samples, &pose);
     let (middle, length) = extent(samples, &on_way, &pose);
-    let height = ((way.length_mm + BEYOND_MM - travel) / (way.length_mm + BEYOND_MM)).max(0.0);
+    let height = way.height(travel);
     let off = |by: DVec3, turn: DVec3| terms(energy, samples, &moved(&pose, by, turn, middle));
     let mut rows = Vec::with_capacity(ON_WAY_ROWS + BESIDE);
     let mut push = |terms: Vec<f64>, value: f64, weight: f64| {
@@ -482,7 +494,7 @@ fn fit(baked: &BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Option<(f64, B
                 on.len(),
                 beside.iter().zip(&on).map(|(b, a)| ROUND_WEIGHT * (b - a)),
             );
-            let height = ((way.length_mm + BEYOND_MM - travel) / (way.length_mm + BEYOND_MM)).max(0.0);
+            let height = way.height(*travel);
             let value = ROUND_WEIGHT * height * rise(distance(x) / WIDTH_MM);
             normal.ger(1.0, &row, &row, 1.0);
             right.axpy(value, &row, 1.0);

@@ -5,8 +5,8 @@
 //! *score* of a pose is the real part of the integral of the product of both densities over space (eq. 8), the *energy* its negative (eq. 11), and force
 //! and torque the negative gradient of the energy (eqs. 12 and 13; [`pair`]).
 //!
-//! It finds and does not hold: the minimum is tens of micrometres off a close fit, and above a mouth flat faces draw each other aside. Experiments with it
-//! are in `mortise-lab energy`; the product guides by exact surfaces.
+//! It finds and does not hold: the minimum is tens of micrometres off a close fit, and above a mouth flat faces draw each other aside (`mortise-lab energy`).
+//! A scene image takes another form of it, whose charges are fitted along a way ([`BakedEnergy`]); what is held to micrometres is guided by exact surfaces.
 //!
 //! Units: millimetres, radians; energy in the unit of the scale that the caller gives.
 
@@ -21,7 +21,7 @@ mod stiffness;
 
 pub use attach::{AttachError, Placed, attach, bytes};
 pub use bake::bake;
-pub use baked::{BakedEnergy, Cost, Way};
+pub use baked::{BakedEnergy, Cost, Way, moved};
 pub use density::{Density, Kernel};
 pub use field::Field;
 pub use of_fit::of_fit;

@@ -11,7 +11,7 @@ use crate::baked::{BakedEnergy, Way};
 use crate::density::{Density, Kernel};
 
 /// The energy that draws part `moving` of `model` along the way in to its `fit` with part `against`. `None` where no way in is known, a part has no
-/// shape, or the shapes have no density for each other. Cost: about 5 s on two cores.
+/// shape, or the shapes have no density for each other. Cost: that of [`bake()`].
 pub fn of_fit(model: &CadModel, moving: usize, against: usize, fit: &Fit) -> Option<BakedEnergy> {
     let path = fit.path.as_ref()?;
     let part = |index: usize| {

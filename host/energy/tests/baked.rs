@@ -2,9 +2,9 @@
 
 use std::io::Write as _;
 
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DVec3};
 use mortise_brep::load_step;
-use mortise_energy::{AttachError, BakedEnergy, Placed, attach, bytes, of_fit};
+use mortise_energy::{AttachError, BakedEnergy, Placed, attach, bytes, moved, of_fit};
 use mortise_fit::{Fit, FitOptions, find, part_named};
 use mortise_protocol::image::{ENERGY_DEPTHS, SceneImage};
 use mortise_shapes::Designed;
@@ -60,17 +60,12 @@ fn the_minimum_is_on_the_way_and_the_stiffness_majorises() {
     for _ in 0..1000 {
         let pose = place(0.5 * (1.0 + signed()) * path.length_mm);
         let about = pose.transform_point3(energy.middle());
-        let moved = |pose: &DAffine3, by: DVec3, turn: DVec3| {
-            DAffine3::from_translation(about + by)
-                * DAffine3::from_quat(DQuat::from_scaled_axis(turn))
-                * DAffine3::from_translation(-about)
-                * *pose
-        };
+        let moved = |pose: &DAffine3, by: DVec3| moved(pose, by, DVec3::ZERO, about);
         let aside = DVec3::new(signed(), signed(), signed());
-        let pose = moved(&pose, 2.0 * aside, DVec3::ZERO);
+        let pose = moved(&pose, 2.0 * aside);
         let by = 0.6 * DVec3::new(signed(), signed(), signed());
         let here = energy.at(&pose, about);
-        let there = energy.at(&moved(&pose, by, DVec3::ZERO), about).energy;
+        let there = energy.at(&moved(&pose, by), about).energy;
         let depth = (-here.energy).clamp(0.0, 1.0) * (ENERGY_DEPTHS - 1) as f64;
         let at = |row: &[f32; ENERGY_DEPTHS]| {
             let share = depth - depth.floor();

@@ -1,7 +1,7 @@
 //! The geometric energy as a board takes it: where its minimum is, its gradient, what it costs and what energy it makes.
 
-use glam::{DAffine3, DQuat, DVec3};
-use mortise_energy::{BakedEnergy, Density, Kernel, Pair, Placed, bytes};
+use glam::{DAffine3, DVec3};
+use mortise_energy::{BakedEnergy, Density, Kernel, Pair, Placed, bytes, moved};
 use mortise_shapes::{Designed, KINDS};
 
 use super::super::{Plan, Row};
@@ -154,12 +154,7 @@ impl Subject {
             let about = pose.transform_point3(self.followed.center_of_mass());
             let by = DVec3::new(signed(), signed(), signed()) * ASIDE_MM;
             let turn = DVec3::new(signed(), signed(), signed()) * TURNED_RAD;
-            let moved = |pose: &DAffine3, by: DVec3, turn: DVec3| {
-                DAffine3::from_translation(about + by)
-                    * DAffine3::from_quat(DQuat::from_scaled_axis(turn))
-                    * DAffine3::from_translation(-about)
-                    * *pose
-            };
+            let moved = |pose: &DAffine3, by: DVec3, turn: DVec3| moved(pose, by, turn, about);
             let pose = moved(&pose, by, turn);
             let found = self.energy.at(&pose, about);
             for axis in DVec3::AXES {
