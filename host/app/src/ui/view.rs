@@ -326,6 +326,10 @@ fn legend(ui: &mut Ui, rect: Rect, top: f32, session: &Session) {
             swatch(ui, theme::of(ui).contact, false, "touches", touches);
             let fits = "Faces that fit: guided onto each other, or held together by contact (hatched)";
             swatch(ui, theme::of(ui).mates, true, "fits", fits);
+            if session.drawing_energy().is_some() {
+                let draws = "From where its energy draws the middle of the part into its fit: the brighter the deeper the energy and the larger its force";
+                swatch(ui, theme::of(ui).mates.gamma_multiply(0.4), false, "draws", draws);
+            }
         });
     });
 }
@@ -391,13 +395,18 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         let text = format!("{own} on {touched}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));
         lines.push((text, theme::of(ui).contact, 12.5));
     }
-    if telemetry.guidance.active > 0 {
+    let guided = match telemetry.guidance.active {
+        0 if session.guides_by_energy() && telemetry.guidance.engagement > 0.0 => {
+            Some("drawn by its energy".to_owned())
+        }
+        0 => None,
+        1 => Some("guided by 1 target".to_owned()),
+        targets => Some(format!("guided by {targets} targets")),
+    };
+    if let Some(guided) = guided {
         let [x, y, z] = telemetry.guidance.wrench.force.map(f64::from);
         let pull = DVec3::new(x, y, z).length();
-        let targets = telemetry.guidance.active;
-        let word = if targets == 1 { "target" } else { "targets" };
-        let text = format!("guided by {targets} {word}, {pull:.2} N");
-        lines.push((text, theme::of(ui).mates, 12.5));
+        lines.push((format!("{guided}, {pull:.2} N"), theme::of(ui).mates, 12.5));
     }
     let painter = ui.painter_at(rect);
     let galleys: Vec<_> = lines
