@@ -11,7 +11,7 @@ use mortise_energy::BakedEnergy;
 use super::mesh::{ShapeMesh, Vertex};
 
 /// Depths of the shells.
-pub const LEVELS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+pub const LEVELS: [f64; 8] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
 /// Corners of a ring.
 const AROUND: usize = 24;
 /// Distances from the way at which the energy is sampled, mm: those for which it is fitted, and a little more.

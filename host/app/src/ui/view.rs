@@ -43,11 +43,6 @@ pub fn show(
     if let Some(surface) = surface {
         let scale = ui.pixels_per_point();
         let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
-        let ground = if ui.visuals().dark_mode {
-            Ground::Dark
-        } else {
-            Ground::Light
-        };
         let cut = view.section.shown(document);
         let look = Look {
             camera: view.camera,
@@ -56,7 +51,7 @@ pub fn show(
             marked: &view.marked.parts,
             over: view.over.now,
             pair: view.pair,
-            ground,
+            ground: ground(ui),
             scale,
         };
         let picture = compose(session, document, &look);
@@ -81,6 +76,14 @@ pub fn show(
     cube::show(ui, rect, view);
     readout(ui, rect, session);
     hint(ui, rect, session, view);
+}
+
+/// Background of the parts in this theme.
+fn ground(ui: &Ui) -> Ground {
+    match ui.visuals().dark_mode {
+        true => Ground::Dark,
+        false => Ground::Light,
+    }
 }
 
 /// Says in the lower right corner what pointer and keys do now.
@@ -328,7 +331,8 @@ fn legend(ui: &mut Ui, rect: Rect, top: f32, session: &Session) {
             swatch(ui, theme::of(ui).mates, true, "fits", fits);
             if session.drawing_energy().is_some() {
                 let draws = "From where its energy draws the middle of the part into its fit: the brighter the deeper the energy and the larger its force";
-                swatch(ui, theme::of(ui).mates.gamma_multiply(0.4), false, "draws", draws);
+                let [r, g, b] = ground(ui).glow().map(|c| (255.0 * c) as u8);
+                swatch(ui, Color32::from_rgb(r, g, b).gamma_multiply(0.6), false, "draws", draws);
             }
         });
     });

@@ -40,10 +40,8 @@ const TINT_OVER: [f32; 4] = [0.45, 0.72, 1.0, 0.12];
 const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
 /// Colour of the ghost of a part in a fit.
 const GHOST_FIT: [f32; 3] = [0.40, 0.82, 0.58];
-/// Colour of the glow from where a part is drawn to its fit, by ground, and opacity of a wall of it at the largest force.
-const GLOW: [f32; 3] = [0.36, 0.92, 0.66];
-const GLOW_LIGHT: [f32; 3] = [0.02, 0.50, 0.36];
-const GLOW_OPACITY: f32 = 0.16;
+/// Opacity of a wall of the glow from where a part is drawn to its fit, at the largest force.
+const GLOW_OPACITY: f32 = 0.12;
 /// Directions across the hatching of sections, degrees, by part.
 const HATCHES: [f32; 4] = [45.0, 135.0, 20.0, 110.0];
 /// Opacity of fixed parts drawn as glass.
@@ -161,10 +159,7 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
 /// From where the energy of the held or selected part draws it, the brighter the larger its force; where the fixed part is.
 fn glow(session: &Session, document: &Document, ground: Ground) -> Option<Glow> {
     let made = session.drawing_energy()?;
-    let [r, g, b] = match ground {
-        Ground::Dark => GLOW,
-        Ground::Light => GLOW_LIGHT,
-    };
+    let [r, g, b] = ground.glow();
     let force = ParameterId::GeometricForce;
     let share = session.parameters[force as usize] / force.row().max;
     (share > 0.0).then_some(Glow {

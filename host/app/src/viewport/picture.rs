@@ -126,6 +126,14 @@ impl Ground {
             Self::Light => [[0.955, 0.965, 0.980, 1.0], [0.845, 0.865, 0.895, 1.0]],
         }
     }
+
+    /// sRGB of a glow: unlike that of fits, of the held part and of what is marked.
+    pub fn glow(self) -> [f32; 3] {
+        match self {
+            Self::Dark => [0.76, 0.58, 1.0],
+            Self::Light => [0.46, 0.20, 0.86],
+        }
+    }
 }
 
 /// Description of one picture.

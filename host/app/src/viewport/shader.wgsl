@@ -156,7 +156,7 @@ fn glow_fragment(in: Solid) -> @location(0) vec4<f32> {
 }
 
 // What lies behind parts shines through them.
-const SHINES_THROUGH: f32 = 0.5;
+const SHINES_THROUGH: f32 = 0.6;
 
 @fragment
 fn hidden_glow_fragment(in: Solid) -> @location(0) vec4<f32> {

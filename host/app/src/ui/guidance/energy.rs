@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use egui::{RichText, Ui, Vec2};
+use egui::{Align, Layout, RichText, Ui, Vec2};
 use mortise_protocol::parameter::ParameterId;
 
 use super::super::{control, parameters, theme};
@@ -49,19 +49,23 @@ fn energy(document: &Document, made: &Made) -> String {
 }
 
 fn progress(ui: &mut Ui, session: &Session, making: &Making, wanted: &mut Vec<Intent>) {
-    ui.horizontal(|ui| {
-        let [least, most] = TAKES_S;
-        let seconds = making.since.elapsed().as_secs();
-        let room = (ui.available_width() - 74.0).max(20.0);
-        let label = egui::Label::new(format!("Making the energy, {seconds} s"))
-            .truncate()
-            .halign(egui::Align::Min);
-        ui.add_sized(Vec2::new(room, 24.0), label)
-            .on_hover_text(format!("It takes {least} to {most} s"));
-        let cancel = egui::Button::new("Cancel").min_size(Vec2::new(64.0, 24.0));
-        let intent = Intent::Energy(EnergyIntent::Cancel);
-        let hint = "Do without it: what the scene has stays";
-        control::intent_button(ui, session, wanted, cancel, intent, hint).accessible_name("Cancel energy");
-    });
+    let seconds = making.since.elapsed().as_secs();
+    ui.allocate_ui_with_layout(
+        Vec2::new(ui.available_width(), 24.0),
+        Layout::right_to_left(Align::Center),
+        |ui| {
+            let cancel = egui::Button::new("Cancel").min_size(Vec2::new(64.0, 24.0));
+            let intent = Intent::Energy(EnergyIntent::Cancel);
+            let hint = "Do without it: what the scene has stays";
+            control::intent_button(ui, session, wanted, cancel, intent, hint)
+                .accessible_name("Cancel energy");
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let [least, most] = TAKES_S;
+                let label = egui::Label::new(format!("Making the energy, {seconds} s")).truncate();
+                let hint = format!("It takes {least} to {most} s of two cores");
+                ui.add(label).on_hover_text(hint);
+            });
+        },
+    );
     ui.ctx().request_repaint_after(TICK);
 }
