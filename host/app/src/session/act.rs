@@ -42,6 +42,7 @@ impl Session {
         if let (false, Some(document)) = (self.is_armed(), &self.document) {
             self.sequencing.follow(document);
         }
+        self.follow_energies();
         self.upload_if_due();
         self.seek_ways();
         advance(self);

@@ -299,7 +299,8 @@ fn sha256_of(files: &[PathBuf]) -> String {
     digits(sum)
 }
 
-fn digits(sum: Sha256) -> String {
+/// The sum in hexadecimal digits.
+pub(super) fn digits(sum: Sha256) -> String {
     sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

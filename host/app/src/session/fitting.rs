@@ -1,6 +1,5 @@
 //! Fits of a part with others, as the operator looks through them: found on request, shown as a ghost, and nothing moves before one is accepted. Pure.
 
-use std::f64::consts::TAU;
 use std::time::Instant;
 
 use glam::{DAffine3, DQuat, DVec3};
@@ -9,6 +8,7 @@ use mortise_fit::{Fit, Path};
 
 use super::document::Document;
 use super::threads::Cancel;
+use super::travel::{pose_at, screw};
 use crate::display::extent::Extent;
 
 /// Most parts that are searched when none is named.
@@ -208,15 +208,15 @@ impl Offer {
 
 /// The way of a point to `seat`, from outside.
 fn points(path: &Path, seat: DVec3) -> Vec<DVec3> {
-    let Some((on_axis, pitch)) = path.screw.filter(|(_, pitch)| pitch.abs() > 1e-9) else {
+    let Some((_, pitch)) = screw(path) else {
         return path.corners_mm.iter().map(|&corner| seat + corner).collect();
     };
-    let turns = path.length_mm / pitch;
-    let count = (turns.abs() * POINTS_A_TURN).ceil().clamp(2.0, 2_000.0) as usize;
+    let count = ((path.length_mm / pitch).abs() * POINTS_A_TURN)
+        .ceil()
+        .clamp(2.0, 2_000.0) as usize;
     let at = |step: usize| {
         let back = 1.0 - step as f64 / count as f64;
-        let turn = DQuat::from_axis_angle(path.direction, -TAU * turns * back);
-        on_axis + turn * (seat - on_axis) - back * path.length_mm * path.direction
+        pose_at(path, &DAffine3::from_translation(seat), back * path.length_mm).translation
     };
     (0..=count).map(at).collect()
 }

@@ -13,6 +13,7 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 
 use super::clutch::ClutchIntent;
+use super::energies::EnergyIntent;
 use super::find_connections::ConnectionsIntent;
 use super::finding::NO_FIT;
 use super::flashing::FlashIntent;
@@ -126,6 +127,8 @@ pub enum Intent {
     FollowFit,
     /// Show no fits any more.
     DropFits,
+    /// An action on geometric energies.
+    Energy(EnergyIntent),
     /// Find the steps in which the assembly goes together.
     FindSequence,
     /// Cancel the search for them.
@@ -223,6 +226,7 @@ impl Intent {
                 | Self::TurnOver
                 | Self::FollowFit
                 | Self::DropFits
+                | Self::Energy(_)
                 | Self::SaveSteps
                 | Self::WriteSteps { .. }
                 | Self::SaveProject
@@ -402,6 +406,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Flash(intent) => session.no_flashing(intent),
         Intent::Joint(intent) => session.no_joint_action(intent),
         Intent::Connections(intent) => session.no_connections_action(*intent),
+        Intent::Energy(intent) => session.no_energy_action(*intent),
         Intent::PlayInsertion => play(session),
     }
 }

@@ -13,6 +13,7 @@ use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 
 use super::connections::ConnectionsFound;
 use super::document::Document;
+use super::energies::EnergyMade;
 use super::fitting::FitsFound;
 use super::flashing::FlashUpdate;
 use super::grouped::Grouped;
@@ -82,6 +83,8 @@ pub enum Update {
     Sequence(SequenceFound),
     /// The ways of a part in the assembly were searched.
     Ways(WaysFound),
+    /// Making the energy of a fit ended.
+    Energy(EnergyMade),
     /// A file was chosen in a dialog.
     Chosen(Purpose, PathBuf),
     /// No file dialog is available: the window must ask for a path.

@@ -116,6 +116,7 @@ impl Session {
             Intent::PlaceFit => self.place_fit(),
             Intent::FollowFit => self.follow_fit(),
             Intent::DropFits => self.drop_fits(),
+            Intent::Energy(intent) => self.perform_on_energies(intent),
             Intent::FindSequence => self.find_sequence(),
             Intent::CancelSequence => self.sequencing.cancel(),
             Intent::SaveSteps => self.ask_for_path(Purpose::SaveSteps),
@@ -165,6 +166,9 @@ impl Session {
             slot = u64::from(connection.capabilities.scene_capacity);
             connection.scene_of = None;
             connection.refused_scene_of = None;
+        }
+        if self.guides_by_energy() {
+            slot = slot.saturating_sub(self.energies.wanted_bytes());
         }
         let cancel = self.start_job("Baking the collision model".to_owned(), generation, None);
         let wanted = match self.method {

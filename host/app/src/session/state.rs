@@ -18,6 +18,7 @@ use mortise_rig::{RigEntry, RigSpec};
 use super::chart::TracesFile;
 use super::connections::Connections;
 use super::document::Document;
+use super::energies::Energies;
 use super::fits::FitChoice;
 use super::fitting::Fitting;
 use super::flashing::Flashing;
@@ -117,6 +118,8 @@ pub struct Session {
     pub guidance: List,
     /// Fits of a part, found on request.
     pub fitting: Option<Fitting>,
+    /// Geometric energies that draw parts to their fits.
+    pub energies: Energies,
     /// The steps in which the assembly goes together, found on request.
     pub sequencing: Sequencing,
     /// The part with which fits are found; `None`: the nearest ones.
@@ -207,6 +210,7 @@ impl Session {
             guide: GuideSettings::default(),
             guidance: List::default(),
             fitting: None,
+            energies: Energies::default(),
             sequencing: Sequencing::default(),
             partner: None,
             ways: Ways::default(),

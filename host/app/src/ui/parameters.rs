@@ -2,7 +2,7 @@
 
 use egui::{ComboBox, RichText, Slider, Ui, Vec2};
 use mortise_bake::Method;
-use mortise_protocol::parameter::{PARAMETERS, Parameter};
+use mortise_protocol::parameter::{PARAMETERS, Parameter, ParameterId};
 
 use super::{control, margin, theme};
 use crate::session::number::number;
@@ -10,6 +10,11 @@ use crate::session::{Intent, Session, obstacle};
 
 /// First word of the parameters that the section on guidance shows instead.
 pub const GUIDANCE: &str = "Guidance";
+
+/// Whether the section on guidance shows a parameter instead.
+fn is_of_guidance(row: &Parameter) -> bool {
+    row.name.starts_with(GUIDANCE) || row.id == ParameterId::GeometricForce
+}
 
 /// First word of the parameters of the coupling, below which its stability margin is drawn.
 const COUPLING: &str = "Coupling";
@@ -43,7 +48,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         let mut rows = PARAMETERS
             .iter()
             .filter(|row| row.name.starts_with(word) && !earlier.iter().any(|(w, _)| row.name.starts_with(w)))
-            .filter(|row| !row.name.starts_with(GUIDANCE))
+            .filter(|row| !is_of_guidance(row))
             .peekable();
         if rows.peek().is_none() {
             continue;
@@ -204,11 +209,9 @@ mod tests {
     use std::sync::Arc;
     use std::time::{Duration, Instant};
 
+    use super::*;
     use egui_kittest::Harness;
     use egui_kittest::kittest::{NodeT as _, Queryable as _};
-    use mortise_protocol::parameter::ParameterId;
-
-    use super::*;
 
     /// A session with a simulated rig, so that parameters can be changed.
     fn connected() -> Session {

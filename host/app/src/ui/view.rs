@@ -43,11 +43,6 @@ pub fn show(
     if let Some(surface) = surface {
         let scale = ui.pixels_per_point();
         let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
-        let ground = if ui.visuals().dark_mode {
-            Ground::Dark
-        } else {
-            Ground::Light
-        };
         let cut = view.section.shown(document);
         let look = Look {
             camera: view.camera,
@@ -56,7 +51,7 @@ pub fn show(
             marked: &view.marked.parts,
             over: view.over.now,
             pair: view.pair,
-            ground,
+            ground: ground(ui),
             scale,
         };
         let picture = compose(session, document, &look);
@@ -81,6 +76,14 @@ pub fn show(
     cube::show(ui, rect, view);
     readout(ui, rect, session);
     hint(ui, rect, session, view);
+}
+
+/// Background of the parts in this theme.
+fn ground(ui: &Ui) -> Ground {
+    match ui.visuals().dark_mode {
+        true => Ground::Dark,
+        false => Ground::Light,
+    }
 }
 
 /// Says in the lower right corner what pointer and keys do now.
@@ -326,6 +329,11 @@ fn legend(ui: &mut Ui, rect: Rect, top: f32, session: &Session) {
             swatch(ui, theme::of(ui).contact, false, "touches", touches);
             let fits = "Faces that fit: guided onto each other, or held together by contact (hatched)";
             swatch(ui, theme::of(ui).mates, true, "fits", fits);
+            if session.drawing_energy().is_some() {
+                let draws = "From where its energy draws the middle of the part into its fit: the brighter the deeper the energy and the larger its force";
+                let [r, g, b] = ground(ui).glow().map(|c| (255.0 * c) as u8);
+                swatch(ui, Color32::from_rgb(r, g, b).gamma_multiply(0.6), false, "draws", draws);
+            }
         });
     });
 }
@@ -391,13 +399,18 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         let text = format!("{own} on {touched}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));
         lines.push((text, theme::of(ui).contact, 12.5));
     }
-    if telemetry.guidance.active > 0 {
+    let guided = match telemetry.guidance.active {
+        0 if session.guides_by_energy() && telemetry.guidance.engagement > 0.0 => {
+            Some("drawn by its energy".to_owned())
+        }
+        0 => None,
+        1 => Some("guided by 1 target".to_owned()),
+        targets => Some(format!("guided by {targets} targets")),
+    };
+    if let Some(guided) = guided {
         let [x, y, z] = telemetry.guidance.wrench.force.map(f64::from);
         let pull = DVec3::new(x, y, z).length();
-        let targets = telemetry.guidance.active;
-        let word = if targets == 1 { "target" } else { "targets" };
-        let text = format!("guided by {targets} {word}, {pull:.2} N");
-        lines.push((text, theme::of(ui).mates, 12.5));
+        lines.push((format!("{guided}, {pull:.2} N"), theme::of(ui).mates, 12.5));
     }
     let painter = ui.painter_at(rect);
     let galleys: Vec<_> = lines

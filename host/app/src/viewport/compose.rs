@@ -4,9 +4,12 @@ use glam::{DAffine3, DVec3};
 use mortise_guide::Standing;
 use mortise_protocol::image::NO_FACE;
 use mortise_protocol::message::Telemetry;
+use mortise_protocol::parameter::ParameterId;
 
 use super::camera::Camera;
-use super::picture::{Areas, Arrow, Cutaway, Fill, Ground, Item, MAX_LIT, MAX_LIT_EDGES, Picture};
+use super::picture::{
+    Areas, Arrow, Cutaway, Fill, Glow, Ground, Item, MAX_LIT, MAX_LIT_EDGES, Picture, Shells,
+};
 use crate::cut::Shown;
 use crate::display::extent::Extent;
 use crate::display::mesh::meeting;
@@ -37,6 +40,8 @@ const TINT_OVER: [f32; 4] = [0.45, 0.72, 1.0, 0.12];
 const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
 /// Colour of the ghost of a part in a fit.
 const GHOST_FIT: [f32; 3] = [0.40, 0.82, 0.58];
+/// Opacity of a wall of the glow from where a part is drawn to its fit, at the largest force.
+const GLOW_OPACITY: f32 = 0.12;
 /// Directions across the hatching of sections, degrees, by part.
 const HATCHES: [f32; 4] = [45.0, 135.0, 20.0, 110.0];
 /// Opacity of fixed parts drawn as glass.
@@ -145,9 +150,23 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
         ground: look.ground,
         items,
         cut,
+        glow: glow(session, document, look.ground),
         arrows: touching.map_or_else(Vec::new, |t| arrows(document, t)),
         line_width: 1.25 * look.scale,
     }
+}
+
+/// From where the energy of the held or selected part draws it, the brighter the larger its force; where the fixed part is.
+fn glow(session: &Session, document: &Document, ground: Ground) -> Option<Glow> {
+    let made = session.drawing_energy()?;
+    let [r, g, b] = ground.glow();
+    let force = ParameterId::GeometricForce;
+    let share = session.parameters[force as usize] / force.row().max;
+    (share > 0.0).then_some(Glow {
+        shells: Shells(made.basin.clone()),
+        pose: *document.poses.get(made.of.against)?,
+        color: [r, g, b, GLOW_OPACITY * share.min(1.0).sqrt()],
+    })
 }
 
 /// Colour mixed into a part, and its weight.

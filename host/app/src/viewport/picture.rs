@@ -8,6 +8,7 @@ use mortise_inspect::CutPlane;
 use super::camera::Camera;
 use crate::cut::Cut;
 use crate::display::extent::Extent;
+use crate::display::mesh::ShapeMesh;
 
 /// Largest number of highlighted faces of one part; the wire carries fewer pairs of one part that are worth distinguishing.
 pub const MAX_LIT: usize = 8;
@@ -86,6 +87,27 @@ pub struct Cutaway {
     pub fills: Vec<Fill>,
 }
 
+/// A mesh shared with the renderer: equal where it is the same one.
+#[derive(Clone, Debug)]
+pub struct Shells(pub Arc<ShapeMesh>);
+
+impl PartialEq for Shells {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// A soft light in space, which hides nothing: brighter where more shells lie over each other, and fainter behind parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Glow {
+    /// Closed shells.
+    pub shells: Shells,
+    /// Shells to world, mm.
+    pub pose: DAffine3,
+    /// sRGB, and opacity of a wall of a shell that is seen head-on.
+    pub color: [f32; 4],
+}
+
 /// Background of the parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ground {
@@ -104,6 +126,14 @@ impl Ground {
             Self::Light => [[0.955, 0.965, 0.980, 1.0], [0.845, 0.865, 0.895, 1.0]],
         }
     }
+
+    /// sRGB of a glow: unlike that of fits, of the held part and of what is marked.
+    pub fn glow(self) -> [f32; 3] {
+        match self {
+            Self::Dark => [0.76, 0.58, 1.0],
+            Self::Light => [0.46, 0.20, 0.86],
+        }
+    }
 }
 
 /// Description of one picture.
@@ -119,6 +149,8 @@ pub struct Picture {
     pub items: Vec<Item>,
     /// The section, where there is one.
     pub cut: Option<Cutaway>,
+    /// From where a part is drawn to its fit.
+    pub glow: Option<Glow>,
     /// Forces.
     pub arrows: Vec<Arrow>,
     /// Width of edges, pixels.

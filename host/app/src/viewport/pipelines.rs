@@ -23,6 +23,8 @@ pub struct Pipelines {
     pub area: wgpu::RenderPipeline,
     /// Transparent parts: blended, without hiding what is behind them.
     pub ghost: wgpu::RenderPipeline,
+    /// Glow in front of parts, and behind them.
+    pub glow: [wgpu::RenderPipeline; 2],
     /// Arrows, drawn over everything.
     pub arrow: wgpu::RenderPipeline,
     /// Edges.
@@ -66,6 +68,17 @@ impl Pipelines {
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32x2],
         })];
         let make = |kind: Kind<'_>| pipeline(device, &module, &layout, &kind);
+        let glow = |fragment, compare| {
+            make(Kind {
+                label: "glow",
+                vertex: "solid_vertex",
+                fragment,
+                buffers: &solid,
+                cull: None,
+                write_depth: false,
+                compare,
+            })
+        };
         Self {
             sky: make(Kind {
                 label: "sky",
@@ -103,6 +116,10 @@ impl Pipelines {
                 write_depth: false,
                 compare: wgpu::CompareFunction::Less,
             }),
+            glow: [
+                glow("glow_fragment", wgpu::CompareFunction::LessEqual),
+                glow("hidden_glow_fragment", wgpu::CompareFunction::Greater),
+            ],
             arrow: make(Kind {
                 label: "arrow",
                 vertex: "solid_vertex",

@@ -9,7 +9,7 @@ use glam::{DAffine3, DMat4, DVec3};
 use wgpu::util::DeviceExt as _;
 
 use super::camera::Projection;
-use super::picture::{Areas, Cutaway, Fill, Item, MAX_LIT, MAX_LIT_EDGES, Picture, arrow_poses};
+use super::picture::{Areas, Cutaway, Fill, Item, MAX_LIT, MAX_LIT_EDGES, Picture, Shells, arrow_poses};
 use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
 use super::solids;
 use crate::display::mesh::ShapeMesh;
@@ -86,6 +86,8 @@ pub struct Renderer {
     arrow: [Loaded; 2],
     /// Areas of the section drawn last.
     areas: Option<(Areas, Vec<Loaded>)>,
+    /// Glow drawn last.
+    glow: Option<(Shells, Loaded)>,
     targets: Option<Targets>,
 }
 
@@ -113,6 +115,7 @@ impl Renderer {
             shapes: Vec::new(),
             arrow,
             areas: None,
+            glow: None,
             targets: None,
         }
     }
@@ -144,6 +147,7 @@ impl Renderer {
             return;
         };
         self.load_areas(picture);
+        self.load_glow(picture);
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let to_clip = picture.camera.view_projection(aspect, picture.extent);
         self.queue
@@ -182,8 +186,9 @@ impl Renderer {
         draws.extend(solid.iter().map(|item| draw_of(item, to_clip, picture)));
         draws.extend((fills.iter()).map(|(cut, fill)| fill_draw(fill, cut, spacing, to_clip)));
         draws.extend(seen_through.iter().map(|item| draw_of(item, to_clip, picture)));
+        draws.extend((picture.glow.iter()).map(|glow| coloured(&glow.pose, glow.color, to_clip)));
         for (poses, color) in &pieces {
-            draws.extend(poses.iter().map(|pose| arrow_draw(pose, *color, to_clip)));
+            draws.extend(poses.iter().map(|pose| coloured(pose, *color, to_clip)));
         }
         self.upload(&draws);
 
@@ -221,6 +226,13 @@ impl Renderer {
                 lines_of(&mut pass, &self.pipelines.lines, shape, item.line);
                 at += 1;
             }
+            if let Some((_, shells)) = &self.glow {
+                self.select(&mut pass, at);
+                for pipeline in &self.pipelines.glow {
+                    solid_of(&mut pass, pipeline, shells);
+                }
+                at += 1;
+            }
             for _ in &pieces {
                 for piece in &self.arrow {
                     self.select(&mut pass, at);
@@ -242,6 +254,14 @@ impl Renderer {
                     .collect();
                 (areas, loaded)
             });
+        }
+    }
+
+    /// Brings the shells of the picture's glow onto the graphics card, unless they are there.
+    fn load_glow(&mut self, picture: &Picture) {
+        let wanted = picture.glow.as_ref().map(|glow| &glow.shells);
+        if self.glow.as_ref().map(|(known, _)| known) != wanted {
+            self.glow = wanted.map(|shells| (shells.clone(), load(&self.device, &shells.0)));
         }
     }
 
@@ -356,7 +376,7 @@ fn slots<T: Copy, const N: usize>(all: &[T], none: T) -> [T; N] {
     std::array::from_fn(|i| all.get(i).copied().unwrap_or(none))
 }
 
-fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
+fn coloured(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
     Draw {
         color,
         ..plain(DMat4::from(*pose), to_clip)

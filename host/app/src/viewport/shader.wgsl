@@ -148,6 +148,22 @@ fn area_fragment(in: Solid) -> @location(0) vec4<f32> {
     return vec4<f32>(encoded(base * select(0.92, 0.38, dark)), 1.0);
 }
 
+// Glow: as much as the line of sight has of a shell, so that it fades towards its outline.
+@fragment
+fn glow_fragment(in: Solid) -> @location(0) vec4<f32> {
+    let through = abs(dot(normalize(in.normal), globals.viewer.xyz));
+    return vec4<f32>(draw.color.rgb, draw.color.a * through);
+}
+
+// What lies behind parts shines through them.
+const SHINES_THROUGH: f32 = 0.6;
+
+@fragment
+fn hidden_glow_fragment(in: Solid) -> @location(0) vec4<f32> {
+    let through = abs(dot(normalize(in.normal), globals.viewer.xyz));
+    return vec4<f32>(draw.color.rgb, SHINES_THROUGH * draw.color.a * through);
+}
+
 // Arrows: no scene light, so that they read the same from everywhere.
 @fragment
 fn arrow_fragment(in: Solid) -> @location(0) vec4<f32> {

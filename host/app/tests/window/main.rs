@@ -8,6 +8,7 @@ mod connecting;
 mod connections;
 #[cfg(target_os = "linux")]
 mod desktop_theme;
+mod energy;
 mod firmware;
 mod fits;
 mod flow;

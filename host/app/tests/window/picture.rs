@@ -93,6 +93,7 @@ fn picture(document: &Document, camera: Camera) -> Picture {
         ground: Ground::Dark,
         items,
         cut: None,
+        glow: None,
         arrows: Vec::new(),
         line_width: 1.5,
     }
@@ -354,6 +355,7 @@ fn nothing_to_draw_is_no_trouble() {
         ground: Ground::Dark,
         items: vec![],
         cut: None,
+        glow: None,
         arrows: vec![],
         line_width: 1.0,
     });
@@ -388,6 +390,7 @@ fn nothing_to_draw_is_no_trouble() {
             },
         ],
         cut: None,
+        glow: None,
         arrows: vec![],
         line_width: 1.0,
     });

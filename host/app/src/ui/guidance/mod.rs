@@ -1,5 +1,6 @@
-//! The list of targets, candidate and active, with choices for each target and for all.
+//! Guidance: its method; by targets the list of them, candidate and active, with choices for each and for all; by energy what acts.
 
+mod energy;
 mod words;
 
 use egui::{CornerRadius, Frame, Layout, Margin, RichText, Slider, Stroke, Ui, Vec2};
@@ -16,6 +17,11 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     ui.add_space(2.0);
     for row in PARAMETERS.iter().filter(|row| row.name == parameters::GUIDANCE) {
         parameters::choice(ui, session, wanted, row);
+    }
+    if session.guides_by_energy() {
+        // Targets do not guide beside it.
+        energy::show(ui, session, wanted);
+        return;
     }
     when(ui, session, wanted);
     for row in PARAMETERS
