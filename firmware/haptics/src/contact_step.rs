@@ -112,7 +112,9 @@ pub(crate) fn contact_step<T: ForceTerm>(
     let budget = given.settings.contact.point_budget;
     let used = search(given, memory, grabbed, (step, free), reach, constraints, work);
     let left = budget.saturating_sub(used);
-    let solves = most_solves(left, work.candidates, constraints.springs);
+    // Those carried over are solved for, too.
+    let contacts = work.candidates.max(memory.contacts.as_slice().len() as u16);
+    let solves = most_solves(left, contacts, constraints.springs);
     let motion = (step, terms, free);
     let solution = solve(given, memory, grabbed, motion, constraints.guided_share, solves);
     memory.pushing = memory.contacts.pushing() as u16;
@@ -212,8 +214,8 @@ fn solve<T: ForceTerm>(
 }
 
 /// Largest number of solves with contacts when `left` field queries remain.
-fn most_solves(left: u32, candidates: u16, springs: usize) -> u8 {
-    let more = left / further_solve_cost(springs, candidates);
+fn most_solves(left: u32, contacts: u16, springs: usize) -> u8 {
+    let more = left / further_solve_cost(springs, contacts);
     u32::from(LEAST_SOLVES)
         .saturating_add(more)
         .min(u32::from(MAX_SOLVES)) as u8

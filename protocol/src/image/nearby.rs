@@ -73,6 +73,12 @@ impl Group {
         })
     }
 
+    /// Number of its faces.
+    #[inline]
+    pub fn count(&self) -> u32 {
+        self.words().len() as u32
+    }
+
     /// Whether every clause is one face.
     #[inline]
     pub fn is_plain(&self) -> bool {

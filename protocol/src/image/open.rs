@@ -193,6 +193,12 @@ impl<'a> SceneImage<'a> {
         self.shape(self.parts[index].shape as usize)
     }
 
+    /// Numbers of nodes of that shape: of its pointshell, and of its edges. Panics when there is no such part.
+    pub fn nodes_of_part(&self, index: usize) -> [usize; 2] {
+        let record = &self.shapes[self.parts[index].shape as usize];
+        [record.node_count, record.edge_node_count].map(|count| count as usize)
+    }
+
     /// The surfaces of that shape alone, for a quarter of the instructions. Panics when there is no such part.
     pub fn surfaces_of_part(&self, index: usize) -> Surfaces<'a> {
         let record = &self.shapes[self.parts[index].shape as usize];

@@ -1,15 +1,45 @@
-//! Boxes of two shapes that are apart: nothing below the roots of their trees is looked at.
+//! Pairs that are apart as a whole: nothing below the roots of their trees is looked at.
 //!
-//! The gap is the same in both directions, and for the edges: it is found once a tick for each part. Cost: some 250 instructions.
+//! While the bounds of the roots hold not even the shapes are. Then the boxes tell: their gap is the same in both directions, and for the edges, and is
+//! found once a tick for each part. Cost: some 250 instructions.
 
 use crate::collision::coherence::{Bound, Known};
-use crate::collision::cost::NODE;
+use crate::collision::cost::{LOOKUP, NODE, PASSED_OVER};
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::node_key::Key;
+use crate::collision::node_key::{Key, Keys};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
+    /// Passes over directed pair `index` where the bounds of the roots of its trees still hold, without a look at its shapes. Returns whether it did.
+    pub fn pass_over(&mut self, index: u16) -> bool {
+        let (part, held) = (usize::from(index / 2), usize::from(self.search.held));
+        let backward = !index.is_multiple_of(2);
+        let scene = self.search.scene;
+        if part.max(held) >= scene.parts().len() || self.spent >= LOOKUP.saturating_mul(self.search.budget) {
+            return false;
+        }
+        let (tree, field) = if backward { (part, held) } else { (held, part) };
+        let [nodes, edge_nodes] = scene.nodes_of_part(tree);
+        let [_, field_edge_nodes] = scene.nodes_of_part(field);
+        let keys = Keys::new(index, nodes + edge_nodes);
+        let mut passed = PASSED_OVER;
+        let mut far = matches!(
+            self.coherence.query(keys.of(0), self.horizon, false),
+            Known::Far(_)
+        );
+        if !backward && edge_nodes > 0 && field_edge_nodes > 0 {
+            let known = self.coherence.query(keys.of(nodes as u32), self.horizon, false);
+            let early = self.early_m();
+            far &= matches!(known, Known::Far(bound) if !bound.expires_within(self.horizon, early));
+            passed += PASSED_OVER;
+        }
+        if far {
+            self.spent += passed;
+        }
+        far
+    }
+
     /// The bound of a tree's root whose own is not known any more, where the boxes of the two shapes are apart: else all nodes below would be looked at.
     pub fn boxes_apart(&mut self, pair: &DirectedPair<'_>, root: Key, known: Known) -> Option<Bound> {
         if !matches!(known, Known::Expired | Known::Nothing) {

@@ -215,8 +215,9 @@ impl Contacts {
     }
 
     /// Carries over contacts that pushed in the last tick and whose leaf was not visited: the object's `motion` since (scaled as the rows) updates
-    /// the gap, the normal stays.
-    pub fn carry(&mut self, motion: &[f32; 6], unvisited: impl Fn(NodeCursor) -> bool) {
+    /// the gap, the normal stays. Returns their number.
+    pub fn carry(&mut self, motion: &[f32; 6], unvisited: impl Fn(NodeCursor) -> bool) -> u32 {
+        let mut carried = 0;
         for i in 0..self.carried_len {
             let old = self.lists[1 - self.current][i];
             let gap = old.gap + dot(&old.row, motion);
@@ -230,8 +231,10 @@ impl Contacts {
                     phase: Phase::Free,
                     ..old
                 };
+                carried += 1;
             }
         }
+        carried
     }
 
     /// Whether these edges of the held part and of part `part` crossed in the last tick.

@@ -46,8 +46,8 @@ macro_rules! costs {
 costs! {
     /// Field query of a point: the unit of the budget.
     LOOKUP = QUERY_INSTRUCTIONS;
-    /// Extra cost of a point at an edge.
-    EDGE = 143;
+    /// Distance to one of several surfaces that a cell names.
+    SURFACE = 124;
     /// Extra cost of a span of an edge: its parabola, and whether it may touch.
     SPAN = 430;
     /// Extra cost of a point within the margin.
@@ -60,6 +60,8 @@ costs! {
     CANDIDATE = 180 + 2 * 37;
     /// Extra cost of a candidate in each solve past the third.
     CANDIDATE_IN_SOLVE = 71;
+    /// Transforms and data of a pair of parts, in one direction, that is searched.
+    PAIR = 800;
     /// Fixed cost of a leaf.
     LEAF = 148;
     /// Field query of a node.
@@ -76,6 +78,10 @@ costs! {
     EXCLUSION = 760;
     /// Bound of the distance from a piece of an edge to a node, or to a piece, of the other part's edges.
     EDGE_BOUND = 48;
+    /// Nearest places of two pieces of edges.
+    EDGE_PAIR = 167;
+    /// Circle through a piece of an edge.
+    CIRCLE = 455;
     /// Contact of two pieces of edges.
     CROSSING = 285;
     /// Setting up a target's spring and what depends on it, without its cost in a solve.
@@ -128,13 +134,14 @@ mod tests {
         assert!(
             counted.eq([
                 ("LOOKUP", 8),
-                ("EDGE", 6),
+                ("SURFACE", 5),
                 ("SPAN", 18),
                 ("NEAR", 6),
                 ("MATING", 2),
                 ("ALLOWANCE", 8),
                 ("CANDIDATE", 11),
                 ("CANDIDATE_IN_SOLVE", 3),
+                ("PAIR", 34),
                 ("LEAF", 6),
                 ("NODE", 12),
                 ("PASSED_OVER", 5),
@@ -143,6 +150,8 @@ mod tests {
                 ("NOTED", 1),
                 ("EXCLUSION", 32),
                 ("EDGE_BOUND", 2),
+                ("EDGE_PAIR", 7),
+                ("CIRCLE", 19),
                 ("CROSSING", 12),
                 ("SPRING", 48),
                 ("SOLVE", 64),

@@ -1,8 +1,11 @@
 //! Directed pair: the tree of one part against the field of the other, with the transforms between their frames.
 
+use core::cell::Cell as Count;
+
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{
-    BRICK_CELLS, EdgeRecord, Field, FieldRecord, NodeRecord, Place, PointRecord, Shape, SpanRecord, Surfaces,
+    BRICK_CELLS, Cell, EdgeRecord, Field, FieldRecord, Nearby, NodeRecord, Place, PointRecord, Shape,
+    SpanRecord, Surfaces,
 };
 
 use crate::collision::exact_surface::exact;
@@ -42,6 +45,8 @@ pub(crate) struct DirectedPair<'i> {
     pub to_arm: Affine,
     /// Field gradient to the direction, in the world, that pushes the held part away.
     pub to_push: Mat3,
+    /// Surfaces of the edges and corners named by cells that were read, since [`Self::surfaces_read`] was last asked.
+    read: Count<u32>,
 }
 
 /// Pieces of sharp convex edges under their tree.
@@ -178,13 +183,28 @@ impl<'i> DirectedPair<'i> {
     pub fn distance(&self, p: [f32; 3]) -> f32 {
         let in_field = self.to_field.apply(p);
         match self.field.place(in_field.to_array()) {
-            Place::Cell(cell) => match exact(self.surfaces, self.field.nearby(&cell), in_field) {
+            Place::Cell(cell) => match exact(self.surfaces, self.nearby(&cell), in_field) {
                 Some((distance, _)) => distance,
                 None => self.field.distance(&cell),
             },
             Place::Far { inside: false, bound } => bound,
             Place::Far { inside: true, bound } => -bound,
         }
+    }
+
+    /// Surfaces that a cell names, each of which is then evaluated.
+    #[inline(always)]
+    pub fn nearby(&self, cell: &Cell<'_>) -> Nearby {
+        let nearby = self.field.nearby(cell);
+        if let Nearby::Convex(group) | Nearby::Reentrant(group) = nearby {
+            self.read.set(self.read.get() + group.count());
+        }
+        nearby
+    }
+
+    /// Number of surfaces in the groups that cells named since this was last asked.
+    pub fn surfaces_read(&self) -> u32 {
+        self.read.take()
     }
 
     /// Directed pair `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
@@ -219,6 +239,7 @@ impl<'i> DirectedPair<'i> {
                 offset: tree_pose.position - center,
             },
             to_push: field_pose.rotation() * if backward { -1.0 } else { 1.0 },
+            read: Count::new(0),
         }
     }
 }

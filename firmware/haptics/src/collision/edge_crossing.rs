@@ -36,6 +36,10 @@ pub(crate) struct Piece<'a> {
     half: Vec3,
     bend: Vec3,
     straight: bool,
+    /// Largest distance of the piece from the segment `center` ± `half`, m.
+    bulge: f32,
+    /// Squared length of `half`, m².
+    half2: f32,
 }
 
 impl<'a> Piece<'a> {
@@ -55,21 +59,15 @@ impl<'a> Piece<'a> {
 
     #[inline]
     fn new(record: &'a EdgeRecord, center: Vec3, half: Vec3, bend: Vec3) -> Self {
+        let straight = record.is_straight();
         Self {
             record,
             center,
             half,
             bend,
-            straight: record.is_straight(),
-        }
-    }
-
-    /// Largest distance of the piece from the segment `center` ± `half`, m.
-    fn bulge(&self) -> f32 {
-        if self.straight {
-            0.0
-        } else {
-            quick_length(self.bend)
+            straight,
+            bulge: if straight { 0.0 } else { quick_length(bend) },
+            half2: half.length_squared(),
         }
     }
 
@@ -84,8 +82,16 @@ impl<'a> Piece<'a> {
     /// Whether its sphere and another one (centre, radius, m) are at most `reach` apart.
     #[inline]
     pub fn is_within(&self, center: Vec3, radius: f32, reach: f32) -> bool {
-        let farthest = self.record.radius + radius + reach;
-        (self.center - center).length_squared() <= farthest * farthest
+        are_within((self.center, self.record.radius), (center, radius), reach)
+    }
+
+    /// Whether it and a sphere (centre, radius, m) are at most `reach` apart, by its segment: a long piece is not near all that its own sphere contains.
+    #[inline]
+    pub fn is_near(&self, (center, radius): (Vec3, f32), reach: f32) -> bool {
+        let apart = center - self.center;
+        let t = share(apart.dot(self.half), self.half2);
+        let farthest = self.bulge + radius + reach;
+        (apart - self.half * t).length_squared() <= farthest * farthest
     }
 
     /// Centre and radius of a sphere that contains it, m.
@@ -98,6 +104,13 @@ impl<'a> Piece<'a> {
     fn normals(&self, rotation: &Mat3) -> [Vec3; 2] {
         (self.record.normals).map(|n| *rotation * Vec3::from_array(oct_decode(n)))
     }
+}
+
+/// Whether two spheres (centre, radius, m) are at most `reach` apart.
+#[inline]
+pub(crate) fn are_within(a: (Vec3, f32), b: (Vec3, f32), reach: f32) -> bool {
+    let farthest = a.1 + b.1 + reach;
+    (a.0 - b.0).length_squared() <= farthest * farthest
 }
 
 /// Whether `n` lies in the cone between the `normals` of the two faces at an edge of tangent `along`, within [`CONE_SINE`].
@@ -143,7 +156,7 @@ impl Circle {
         let (half, bend) = (piece.half, piece.bend);
         let across = half.cross(bend);
         // Curvature κ = 2·|half × bend|/|half|³, towards the part of `bend` across `half`.
-        let inverse_half = inverse_sqrt(half.length_squared());
+        let inverse_half = inverse_sqrt(piece.half2);
         let curvature = 2.0 * quick_length(across) * inverse_half * inverse_half * inverse_half;
         let inward = across.cross(half);
         Some(Self {
@@ -190,7 +203,7 @@ pub(crate) fn run_along(own: &Piece<'_>, other: &Piece<'_>, [t, s]: [f32; 2]) ->
 #[inline]
 pub(crate) fn nearest(own: &Piece<'_>, other: &Piece<'_>) -> ([f32; 2], f32) {
     let (d, e, apart) = (own.half, other.half, own.center - other.center);
-    let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
+    let (dd, ee, de) = (own.half2, other.half2, d.dot(e));
     let (da, ea) = (d.dot(apart), e.dot(apart));
     let sine2 = dd * ee - de * de;
     let first = if sine2 > 1e-6 * dd * ee {
@@ -200,7 +213,7 @@ pub(crate) fn nearest(own: &Piece<'_>, other: &Piece<'_>) -> ([f32; 2], f32) {
     };
     let s = share(de * first + ea, ee);
     let t = share(de * s - da, dd);
-    let distance = quick_length(apart + d * t - e * s) - (own.bulge() + other.bulge());
+    let distance = quick_length(apart + d * t - e * s) - (own.bulge + other.bulge);
     ([t, s], distance)
 }
 

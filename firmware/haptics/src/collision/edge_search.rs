@@ -14,9 +14,9 @@ use mortise_protocol::image::{EDGE_ERROR_CELLS, EdgeRecord, NodeRecord};
 
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
-use crate::collision::cost::{CROSSING, EDGE_BOUND, LOOKUP, MATING, NODE, PASSED_OVER};
+use crate::collision::cost::{CIRCLE, CROSSING, EDGE_BOUND, EDGE_PAIR, LOOKUP, MATING, NODE, PASSED_OVER};
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::edge_crossing::{Circle, Crossing, Piece, crossing, nearest, run_along};
+use crate::collision::edge_crossing::{Circle, Crossing, Piece, are_within, crossing, nearest, run_along};
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::Key;
 use crate::collision::rules::{FacePairRules, Mating};
@@ -58,7 +58,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let to = to.saturating_sub(first);
         let edge_error = EDGE_ERROR_CELLS * pair.field.record().cell;
         let limit = LOOKUP.saturating_mul(self.search.budget);
-        let early = EARLY_M + 2.0 * EARLY_TICKS as f32 * self.search.way;
+        let early = self.early_m();
         // End of the subtree whose bound still holds although it is visited, and that bound.
         let (mut covered, mut cover) = (0, Bound::NOW);
         let mut ancestors = Ancestors::new();
@@ -110,6 +110,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                     self.spent += NODE;
                     self.work.nodes += 1;
                     distance = pair.distance(node.center) - (node.radius + edge_error);
+                    self.charge_surfaces(pair);
                     let far = if leaf {
                         self.search.margin + early
                     } else {
@@ -133,7 +134,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             let travel = if holds {
                 self.travel_to_edges(pair, node)
             } else {
-                self.edge_leaf(pair, here, node)
+                // Else it would be found anew in every tick beside a near edge.
+                let lasting = known == Known::Nothing;
+                self.edge_leaf(pair, here, node, lasting)
             };
             let distance = larger(distance, travel);
             ancestors.note(if distance > self.search.margin {
@@ -146,6 +149,11 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         None
     }
 
+    /// Travel within which a bound expires early, m, see [`EARLY_M`].
+    pub fn early_m(&self) -> f32 {
+        EARLY_M + 2.0 * EARLY_TICKS as f32 * self.search.way
+    }
+
     /// Whether a node whose bound has not expired is visited all the same, see [`EARLY_M`].
     #[inline]
     fn due(&self, key: Key, bound: Bound, leaf: bool, early: f32) -> bool {
@@ -154,9 +162,15 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     }
 
     /// Compares the pieces of a leaf with the other part's edges and offers their contacts. Returns what the object must travel until two of them can
-    /// touch, m: 0 where they may touch in this tick.
+    /// touch, m: 0 where they may touch in this tick, or where a `lasting` bound is not asked for.
     #[inline(never)]
-    fn edge_leaf(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, node: &NodeRecord) -> f32 {
+    fn edge_leaf(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        node: &NodeRecord,
+        lasting: bool,
+    ) -> f32 {
         let reach = self.search.margin + DEEPEST_M;
         let mut near = Near::new();
         let mut any_near = false;
@@ -171,7 +185,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         if !near.is_empty() {
             any_near |= self.cross(pair, leaf, node, &near);
         }
-        if any_near {
+        if any_near || !lasting || self.left() == 0 {
             0.0
         } else {
             self.travel_to_edges(pair, node)
@@ -218,10 +232,14 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             if node.skip != index {
                 continue;
             }
-            for piece in node.points(tree.pieces).iter().map(Piece::fixed) {
+            for record in node.points(tree.pieces) {
                 self.spent += EDGE_BOUND;
-                if piece.is_within(center, radius, reach) {
-                    visit(self, piece);
+                if are_within(
+                    (Vec3::from_array(record.center), record.radius),
+                    (center, radius),
+                    reach,
+                ) {
+                    visit(self, Piece::fixed(record));
                 }
             }
         }
@@ -241,11 +259,12 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
+            self.spent += EDGE_BOUND * near.len() as u32;
             for other in near {
-                if !other.is_within(center, radius, reach) {
+                if !other.is_within(center, radius, reach) || !own.is_near(other.sphere(), reach) {
                     continue;
                 }
-                self.spent += EDGE_BOUND;
+                self.spent += EDGE_PAIR;
                 let (from, distance) = nearest(&own, other);
                 if distance > reach || run_along(&own, other, from) {
                     continue;
@@ -260,6 +279,16 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         any_near
     }
 
+    /// The circle through a piece, which is kept in `known`; `None` for a straight one.
+    #[inline]
+    fn circle<'c>(&mut self, known: &'c mut Option<Circle>, piece: &Piece<'_>) -> Option<&'c Circle> {
+        if known.is_none() {
+            *known = Circle::of(piece);
+            self.spent += CIRCLE * u32::from(known.is_some());
+        }
+        known.as_ref()
+    }
+
     /// The smaller of `least` and what the pieces of a leaf can travel until they come to cross one of `near`, and [`DEEPEST_M`], m.
     fn clear(
         &mut self,
@@ -268,8 +297,12 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         near: &[Piece<'_>],
         mut least: f32,
     ) -> f32 {
+        if near.is_empty() {
+            return least;
+        }
         let rotation = pair.to_field.rotation();
-        let circles: Vec<Option<Circle>, NEAR_PIECES> = near.iter().map(Circle::of).collect();
+        // Found where they are asked for.
+        let mut circles: [Option<Circle>; NEAR_PIECES] = [const { None }; NEAR_PIECES];
         // Long enough that the distance, which costs more, is not asked for.
         let lasting = self.search.margin + DEEPEST_M + EARLY_M;
         // A part that turns by an angle travels at least that times its radius.
@@ -278,19 +311,20 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
-            let circle = Circle::of(&own);
-            for (other, other_circle) in near.iter().zip(&circles) {
-                if !other.is_within(center, radius, least) {
+            let mut circle = None;
+            self.spent += EDGE_BOUND * near.len() as u32;
+            for (other, other_circle) in near.iter().zip(&mut circles) {
+                if !other.is_within(center, radius, least) || !own.is_near(other.sphere(), least) {
                     continue;
                 }
                 self.spent += EDGE_BOUND;
-                let along = match (&circle, other_circle) {
-                    (Some(own), Some(other)) => DEEPEST_M + own.travel(other, turn),
-                    _ => 0.0,
-                };
+                let travel = (self.circle(&mut circle, &own))
+                    .and_then(|own| Some(own.travel(self.circle(other_circle, other)?, turn)));
+                let along = travel.map_or(0.0, |travel| DEEPEST_M + travel);
                 least = if along > lasting {
                     smaller(least, along)
                 } else {
+                    self.spent += EDGE_PAIR;
                     smaller(least, larger(along, nearest(&own, other).1))
                 };
             }

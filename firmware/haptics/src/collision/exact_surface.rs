@@ -13,7 +13,7 @@ use mortise_protocol::image::{
 };
 
 use crate::collision::patch::distance_to_patch;
-use crate::math::scalar::inverse_sqrt;
+use crate::math::scalar::{inverse_sqrt, sin_cos};
 use crate::math::vector::length;
 
 /// Sine of the smallest angle between faces that form an edge: below it one face continues the other.
@@ -64,7 +64,7 @@ pub(crate) fn signed(face: &FaceRecord, p: Vec3) -> Option<(f32, Vec3)> {
     let (natural, normal) = match face.kind {
         surface_kind::CYLINDER => (r - face.radius, out),
         surface_kind::CONE => {
-            let (sin, cos) = (libm::sinf(face.second), libm::cosf(face.second));
+            let (sin, cos) = sin_cos(face.second);
             ((r - face.radius) * cos - along * sin, out * cos - axis * sin)
         }
         surface_kind::TORUS => {
@@ -361,7 +361,10 @@ fn off_center(face: &FaceRecord, p: Vec3) -> Option<f32> {
     let from = p - Vec3::from_array(face.origin);
     let along = from.dot(Vec3::from_array(face.axis));
     let natural = match face.kind {
-        surface_kind::CONE => -face.radius * libm::cosf(face.second) - along * libm::sinf(face.second),
+        surface_kind::CONE => {
+            let (sin, cos) = sin_cos(face.second);
+            -face.radius * cos - along * sin
+        }
         surface_kind::TORUS => {
             let out = length(from - Vec3::from_array(face.axis) * along) - face.radius;
             libm::sqrtf(out * out + along * along) - face.second

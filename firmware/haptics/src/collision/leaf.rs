@@ -3,7 +3,7 @@
 use mortise_protocol::image::{NO_SPAN, PointRecord};
 
 use crate::collision::coherence::Bound;
-use crate::collision::cost::{CACHED_POINT, FIND_FACE, LOOKUP, NOTED};
+use crate::collision::cost::{CACHED_POINT, FIND_FACE, LOOKUP, NOTED, SURFACE};
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::on_surface_of;
 use crate::collision::face_cache::CachedFace;
@@ -74,12 +74,20 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             let reach = pair.span(point).map_or(0.0, |span| span.reach());
             scan.add(pair.distance(point.position) - reach);
         }
+        let surfaces = self.charge_surfaces(pair);
         self.selected_points(pair, leaf, points, scan.near & mask);
         let before = self.spent;
         let bound = self.record_scan(pair, leaf, points, scan);
         // This work would not double with twice the points.
-        self.decimation_work += self.spent - before;
+        self.decimation_work += surfaces + self.spent - before;
         bound
+    }
+
+    /// Charges the surfaces of a pair that were evaluated since this was last done; returns how much.
+    pub fn charge_surfaces(&mut self, pair: &DirectedPair<'_>) -> u32 {
+        let cost = SURFACE * pair.surfaces_read();
+        self.spent += cost;
+        cost
     }
 
     /// Stores what the `scan` of a leaf found, and returns the leaf's advancement bound.

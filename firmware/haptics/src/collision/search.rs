@@ -23,7 +23,7 @@ use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
-    ALLOWANCE, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, Used,
+    ALLOWANCE, CANDIDATE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, Used,
 };
 use crate::collision::decimation::mask;
 use crate::collision::directed_pair::DirectedPair;
@@ -121,14 +121,11 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         let stop = traversal
             .pairs(start, None)
             .or_else(|| traversal.pairs(NodeCursor::FIRST, Some(start)));
-        traversal.spent -= CANDIDATE * traversal.expected;
-        let used = Used {
-            all: traversal.used(),
-            point_work: traversal.point_work / LOOKUP,
-        };
+        let (spent, expected, point_work) = (traversal.spent, traversal.expected, traversal.point_work);
+        let mut carried = 0;
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET);
-            contacts.carry(&self.motions[0], |leaf| {
+            carried = contacts.carry(&self.motions[0], |leaf| {
                 let visited = if start < stop {
                     start <= leaf && leaf < stop
                 } else {
@@ -137,21 +134,31 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
                 !visited
             });
         }
+        let used = Used {
+            all: (spent + CANDIDATE * carried - CANDIDATE * expected) / LOOKUP,
+            point_work: point_work / LOOKUP,
+        };
         (stop, used)
     }
 
-    /// Directed pair `index`, or `None` when the bounding spheres of the two parts are apart.
+    /// Whether the bounding spheres of the two parts of directed pair `index` are near each other.
+    #[inline]
+    fn is_near(&self, index: u16) -> bool {
+        let part = index / 2;
+        let placed = |part: u16| self.parts.get(usize::from(part));
+        let (Some(other), Some(held)) = (placed(part), placed(self.held)) else {
+            return false;
+        };
+        let apart = held.radius + other.radius + self.margin + self.shrunk_m;
+        let held_center = self.pose.transform_point(held.local_center);
+        part != self.held && (held_center - other.center).length_squared() <= apart * apart
+    }
+
+    /// Directed pair `index`; `None` where the scene has no such part.
     fn pair(&self, index: u16) -> Option<DirectedPair<'i>> {
         let part = index / 2;
         let other = self.parts.get(usize::from(part))?;
-        let held = self.parts.get(usize::from(self.held))?;
-        let apart = held.radius + other.radius + self.margin + self.shrunk_m;
-        let held_center = self.pose.transform_point(held.local_center);
-        if part == self.held || (held_center - other.center).length_squared() > apart * apart {
-            return None;
-        }
-        let parts = self.scene.parts().len();
-        if usize::from(part) >= parts {
+        if usize::from(part) >= self.scene.parts().len() {
             return None;
         }
         let other_shape = self.scene.shape_of_part(usize::from(part));
@@ -177,14 +184,19 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         work: &'w mut Work,
     ) -> Traversal<'w, 'w, 'i, R> {
         contacts.begin(keep_previous);
+        // A quarter of the budget at least is left, so that every leaf's turn comes.
+        let most = LOOKUP
+            .saturating_mul(self.budget / 4 * 3)
+            .saturating_sub(LOOKUP * self.reserved);
+        let expected = self.carried.min(most / CANDIDATE);
         Traversal {
             search: self,
             horizon: coherence.horizon(self.margin),
             coherence,
             contacts,
             work,
-            spent: LOOKUP * self.reserved + CANDIDATE * self.carried,
-            expected: self.carried,
+            spent: LOOKUP * self.reserved + CANDIDATE * expected,
+            expected,
             point_work: 0,
             decimation_work: 0,
             exclusion_work: 0,
@@ -253,9 +265,14 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let pairs = 2 * self.search.parts.len() as u16;
         let last = end.map_or(pairs, |e| (e.pair + 1).min(pairs));
         for index in start.pair..last {
+            let is_whole = index != start.pair && end.is_none_or(|end| end.pair != index);
+            if !self.search.is_near(index) || is_whole && self.pass_over(index) {
+                continue;
+            }
             let Some(pair) = self.search.pair(index) else {
                 continue;
             };
+            self.spent += PAIR;
             let from = if index == start.pair { start.node } else { 0 };
             let to = match end {
                 Some(end) if end.pair == index => end.node,
@@ -328,6 +345,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                     self.spent += NODE;
                     self.work.nodes += 1;
                     let distance = pair.distance(node.center) - (node.radius + edge_error);
+                    self.charge_surfaces(pair);
                     if distance > self.search.margin {
                         ancestors.note(self.coherence.set_distance(key, distance));
                         index = node.skip;
@@ -368,6 +386,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                     mask => self.decimated(pair, here, points, mask),
                 }
             });
+            self.charge_surfaces(pair);
             self.point_work += self.spent - before - self.decimation_work;
             self.decimation_work = 0;
         }
@@ -422,8 +441,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         cell: &Cell<'_>,
         p: Vec3,
     ) -> f32 {
-        self.spent += EDGE;
-        let nearby = pair.field.nearby(cell);
+        let nearby = pair.nearby(cell);
         if let Some(mut found) = exact_on_face(pair.surfaces, nearby, p) {
             let distance = found.distance;
             if distance < self.search.margin {
@@ -567,14 +585,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         self.work.candidates = self.work.candidates.saturating_add(1);
     }
 
-    /// Budget spent so far, field queries.
-    fn used(&self) -> u32 {
-        self.spent / LOOKUP
-    }
-
     /// Budget left, field queries.
     pub fn left(&self) -> u32 {
-        self.search.budget.saturating_sub(self.used())
+        self.search.budget.saturating_sub(self.spent / LOOKUP)
     }
 }
 

@@ -132,7 +132,7 @@ pub(crate) fn near_at(pair: &DirectedPair<'_>, face: Option<u16>, p: Vec3) -> Op
 /// As [`near_at`], in a cell that names several faces, or none with a closed form.
 #[inline(never)]
 fn near_in(pair: &DirectedPair<'_>, cell: &Cell<'_>, p: Vec3) -> Option<Near> {
-    if let Some(found) = exact_on_face(pair.surfaces, pair.field.nearby(cell), p) {
+    if let Some(found) = exact_on_face(pair.surfaces, pair.nearby(cell), p) {
         return Some(Near { found, alone: false });
     }
     let sample = pair.field.sample(cell);
