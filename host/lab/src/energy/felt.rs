@@ -44,7 +44,7 @@ const BUZZ_HZ: f64 = 100.0;
 pub(crate) const PLAY_MM: f64 = 0.1;
 /// Ticks of a window of vibration, and of an interval of a chart's envelope.
 const WINDOW_TICKS: usize = 100;
-const ENVELOPE_TICKS: usize = 20;
+const ENVELOPE_TICKS: usize = 40;
 
 /// The tests, each with the peg's clearance, mm: both at exact fit as in the paper, and the snap test with play.
 pub(crate) const CASES: [(Test, f64); 3] = [(Test::Collision, 0.0), (Test::Snap, 0.0), (Test::Snap, PLAY_MM)];
@@ -298,7 +298,7 @@ impl Felt {
         }
     }
 
-    /// Force over time: the least and the largest of every 20 ms.
+    /// Force over time: the least and the largest of every 40 ms.
     pub fn chart(&self, section: &str) -> Chart {
         let forces: Vec<f64> = (self.runs.iter().flatten())
             .map(|moment| moment.force.length())
@@ -307,37 +307,40 @@ impl Felt {
             Test::Collision => "seated peg pushed against its walls",
             Test::Snap => "peg brought near its fit once a second",
         };
-        let points = envelope(&forces).into_iter().map(|(tick, y)| Point {
-            x: tick / TICK_HZ,
-            y,
-            ..Point::default()
+        // A line of its own for each interval: one line would turn back at each, and a thick line's joints there reach far beyond its points.
+        let bars = envelope(&forces).into_iter().map(|(tick, ends)| Series {
+            name: String::new(),
+            look: Look::BlueDisc,
+            line: Line::Trace,
+            points: ends
+                .map(|y| Point {
+                    x: tick / TICK_HZ,
+                    y,
+                    ..Point::default()
+                })
+                .into(),
         });
         Chart {
             title: format!("{section}: {title}"),
             note: String::new(),
             x: Axis::new("time, s").linear(),
             y: Axis::new("force, N").linear(),
-            series: vec![Series {
-                name: String::new(),
-                look: Look::BlueDisc,
-                line: Line::Trace,
-                points: points.collect(),
-            }],
+            series: bars.collect(),
         }
     }
 }
 
-/// Ticks and values of the least and the largest value of each interval, in an order that joins neighbours.
-fn envelope(values: &[f64]) -> Vec<(f64, f64)> {
-    let intervals = values.chunks(ENVELOPE_TICKS).enumerate();
-    let ends = intervals.flat_map(|(index, values)| {
-        let middle = (index * ENVELOPE_TICKS) as f64 + 0.5 * values.len() as f64;
-        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-        let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let ends = [(middle, least), (middle, largest)];
-        if index % 2 == 0 { ends } else { [ends[1], ends[0]] }
+/// Middle of each interval, ticks, and the least and the largest value in it and at its neighbours' ends, so that neighbours meet.
+fn envelope(values: &[f64]) -> Vec<(f64, [f64; 2])> {
+    let starts = (0..values.len()).step_by(ENVELOPE_TICKS);
+    let intervals = starts.map(|start| {
+        let end = (start + ENVELOPE_TICKS).min(values.len());
+        let with_ends = &values[start.saturating_sub(1)..(end + 1).min(values.len())];
+        let least = with_ends.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = with_ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        (0.5 * (start + end) as f64, [least, largest])
     });
-    ends.collect()
+    intervals.collect()
 }
 
 /// How much a force vibrates.
@@ -486,11 +489,20 @@ mod tests {
     }
 
     #[test]
-    fn an_envelope_keeps_the_extremes_of_each_interval() {
-        let mut values = vec![1.0; 3 * ENVELOPE_TICKS];
-        (values[3], values[ENVELOPE_TICKS], values[3 * ENVELOPE_TICKS - 1]) = (5.0, -1.0, 2.0);
-        let found: Vec<f64> = envelope(&values).into_iter().map(|(_, value)| value).collect();
-        assert_eq!(found, [1.0, 5.0, 1.0, -1.0, 1.0, 2.0]);
+    fn an_envelope_keeps_the_extremes_of_each_interval_and_joins_neighbours() {
+        let mut values = vec![1.0; 2 * ENVELOPE_TICKS + 3];
+        (values[3], values[ENVELOPE_TICKS], values[2 * ENVELOPE_TICKS + 2]) = (5.0, -1.0, 2.0);
+        let found = envelope(&values);
+        let middle = 0.5 * ENVELOPE_TICKS as f64;
+        let last = 2.0 * ENVELOPE_TICKS as f64 + 1.5;
+        assert_eq!(
+            found,
+            [
+                (middle, [-1.0, 5.0]),
+                (3.0 * middle, [-1.0, 1.0]),
+                (last, [1.0, 2.0])
+            ]
+        );
     }
 
     #[test]
