@@ -4,6 +4,7 @@ use crate::blend::Blend;
 use crate::clearance::Clearance;
 use crate::energy::Energy;
 use crate::experiment::Experiment;
+use crate::helps::Helps;
 use crate::hybrid::Hybrid;
 use crate::pareto::Pareto;
 use crate::peers::Peers;
@@ -19,6 +20,7 @@ pub const ALL: &[&dyn Experiment] = &[
     &Peers,
     &Blend,
     &Energy,
+    &Helps,
     &Stability,
     &Rate,
     &Shrink,

@@ -13,7 +13,9 @@ use mortise_protocol::message::Telemetry;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 use mortise_scenario::wire::pose_mm;
-use mortise_scenario::{PreparedScene, Recording, Scenario, connect, overlap, record};
+use mortise_scenario::{
+    Key, PreparedScene, Recording, Scenario, connect, connect_with_scene, overlap, record,
+};
 
 use crate::LabError;
 use crate::guided::{key, script};
@@ -29,7 +31,7 @@ const SPEED_MM_S: f64 = 25.0;
 /// Ticks after full engagement until a part is on its way: 1 mm decays below 1 µm with τ = 20 ms.
 const SETTLING_TICKS: u32 = 150;
 /// A part that comes so near to the end of its way is in, mm.
-const IN_MM: f64 = 0.1;
+pub(crate) const IN_MM: f64 = 0.1;
 /// Time of a careless hand from one place to the next, s, and how far it goes aside and out, mm, and turns, rad.
 const WANDER_S: f64 = 0.25;
 const WANDER_MM: f64 = 5.0;
@@ -44,6 +46,25 @@ pub(crate) struct Off {
     pub aside_mm: f64,
     pub direction_rad: f64,
     /// Rotation vector, rad.
+    pub turn: DVec3,
+}
+
+/// Where the moving part is when it is grabbed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Begin {
+    /// On the way, before the mouth.
+    Outside,
+    /// In the fit.
+    Seated,
+}
+
+/// Where a hand wants the part.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wanted {
+    /// Travel along the way, mm: 0 in the fit, negative before it.
+    pub travel_mm: f64,
+    /// Beside the way, mm, and rotation vector, rad; world.
+    pub aside: DVec3,
     pub turn: DVec3,
 }
 
@@ -112,6 +133,8 @@ pub(crate) struct Seen {
     pub peak_n: f64,
     /// Deepest overlap by the exact surfaces, mm.
     pub overlap_mm: f64,
+    /// Time of the run, s.
+    pub run_s: f64,
     /// Ticks missed.
     pub missed: u32,
     /// Instructions of the longest tick; NaN where they are not counted.
@@ -119,8 +142,13 @@ pub(crate) struct Seen {
 }
 
 impl Followed {
-    /// The best fit of parts `moving` and `fixed` of a STEP file that has a way in.
-    pub fn new(step: &Path, [moving, fixed]: [&str; 2]) -> Result<Self, LabError> {
+    /// The best fit of parts `moving` and `fixed` of a STEP file that has a way in, the moving part before its mouth.
+    pub fn new(step: &Path, parts: [&str; 2]) -> Result<Self, LabError> {
+        Self::beginning(step, parts, Begin::Outside)
+    }
+
+    /// As [`Self::new`], the moving part elsewhere.
+    pub fn beginning(step: &Path, [moving, fixed]: [&str; 2], begin: Begin) -> Result<Self, LabError> {
         let bad = |what: String| LabError::Input {
             name: step.display().to_string(),
             what,
@@ -143,7 +171,10 @@ impl Followed {
             into,
             screw,
         };
-        let start = way.at(-(length_mm + ROOM_MM));
+        let start = match begin {
+            Begin::Outside => way.at(-(length_mm + ROOM_MM)),
+            Begin::Seated => way.at(0.0),
+        };
         let depth_mm = mating_depth(&model, [a, b], fit, into);
         model.parts[a].placement = start;
         let middle = start.transform_point3(model.shapes[model.parts[a].shape].center_of_mass);
@@ -219,18 +250,16 @@ impl Followed {
         let mut scenario = self.scenario.clone();
         let total = self.travel_mm(&self.start).abs();
         let before = total - self.depth_mm - BEFORE_MOUTH_MM;
-        let (x, y) = self.way.into.any_orthonormal_pair();
+        let [x, y] = self.across();
         let (sin, cos) = off.direction_rad.sin_cos();
-        let aside = off.aside_mm * (cos * x + sin * y);
-        let grip = DVec3::from_array(scenario.hand.grip_mm);
-        let held = self.start.inverse().transform_point3(grip);
         // The hand after a travel from the start, and off.
         let off_at = |t_s: f64, travel: f64| {
-            let at = self.way.at(travel - total);
-            let rotation = DQuat::from_mat3(&(at.matrix3 * self.start.matrix3.inverse()));
-            let turn = (DQuat::from_scaled_axis(off.turn) * rotation).to_scaled_axis();
-            let offset = at.transform_point3(held) - grip + aside;
-            key(t_s, offset.to_array(), turn.to_array().map(f64::to_degrees))
+            let wanted = Wanted {
+                travel_mm: travel - total,
+                aside: off.aside_mm * (cos * x + sin * y),
+                turn: off.turn,
+            };
+            self.key(t_s, &wanted)
         };
         let down = total + BEYOND_MM - before;
         let down_s = down / SPEED_MM_S;
@@ -241,6 +270,47 @@ impl Followed {
         }));
         scenario.run.duration_s = 1.0 + down_s;
         scenario
+    }
+
+    /// The hand at a time at which it wants the part somewhere.
+    pub fn key(&self, t_s: f64, wanted: &Wanted) -> Key {
+        let grip = DVec3::from_array(self.scenario.hand.grip_mm);
+        let held = self.start.inverse().transform_point3(grip);
+        let at = self.way.at(wanted.travel_mm);
+        let rotation = DQuat::from_mat3(&(at.matrix3 * self.start.matrix3.inverse()));
+        let turn = (DQuat::from_scaled_axis(wanted.turn) * rotation).to_scaled_axis();
+        let offset = at.transform_point3(held) - grip + wanted.aside;
+        key(t_s, offset.to_array(), turn.to_array().map(f64::to_degrees))
+    }
+
+    /// Plays hands helped by the geometric energy, one after another on one rig that has the scene from its start; each ends with its last key. Telemetry of every
+    /// `every_ticks`-th tick.
+    pub fn play(
+        &self,
+        hands: &[Vec<Key>],
+        every_ticks: u16,
+        rig: &RigSpec,
+    ) -> Result<Vec<Recording>, LabError> {
+        let mut scenario = self.helped(Help::Energy, self.scenario.clone());
+        scenario.run.telemetry_every_ticks = every_ticks;
+        let client = connect_with_scene(&scenario, rig, &self.scene)?;
+        let played = hands.iter().map(|keys| {
+            scenario.run.duration_s = keys.last().map_or(0.0, |key| key.t_s);
+            scenario.hand.keyframes.clone_from(keys);
+            Ok(record(&client, &scenario, &self.scene, None)?)
+        });
+        played.collect()
+    }
+
+    /// Placement of the moving part in the fit, mm.
+    pub fn seat(&self) -> &DAffine3 {
+        &self.way.seat
+    }
+
+    /// Two directions across the way and across each other, world.
+    pub fn across(&self) -> [DVec3; 2] {
+        let (x, y) = self.way.into.any_orthonormal_pair();
+        [x, y]
     }
 
     /// Placement of the moving part in the other part's frame after a travel outward from the fit, mm.
@@ -273,21 +343,20 @@ impl Followed {
     ) -> Result<Recording, LabError> {
         let mut scenario = self.helped(Help::Energy, self.scenario.clone());
         let total = self.travel_mm(&self.start).abs();
-        let (x, y) = self.way.into.any_orthonormal_pair();
-        let grip = DVec3::from_array(scenario.hand.grip_mm);
-        let held = self.start.inverse().transform_point3(grip);
+        let [x, y] = self.across();
         let count = (duration_s / WANDER_S).round() as usize;
         scenario.hand.keyframes = vec![key(0.0, [0.0; 3], [0.0; 3])];
         scenario.hand.keyframes.extend((1..=count).map(|i| {
             let mut signed = || 2.0 * random.f64() - 1.0;
             let travel = -0.5 * (1.0 + signed()) * total.min(self.depth_mm + WANDER_MM);
             let aside = WANDER_MM * (signed() * x + signed() * y);
-            let turn = DQuat::from_scaled_axis(WANDER_RAD * DVec3::new(signed(), signed(), signed()));
-            let at = self.way.at(travel);
-            let rotation = DQuat::from_mat3(&(at.matrix3 * self.start.matrix3.inverse()));
-            let offset = at.transform_point3(held) - grip + aside;
-            let turn = (turn * rotation).to_scaled_axis().to_array().map(f64::to_degrees);
-            key(WANDER_S * i as f64, offset.to_array(), turn)
+            let turn = WANDER_RAD * DVec3::new(signed(), signed(), signed());
+            let wanted = Wanted {
+                travel_mm: travel,
+                aside,
+                turn,
+            };
+            self.key(WANDER_S * i as f64, &wanted)
         }));
         scenario.run.duration_s = WANDER_S * count as f64;
         // Energies are summed over every tick.
@@ -352,8 +421,15 @@ impl Followed {
         scenario
     }
 
+    /// Distance of the part's centre of mass from its way (a straight one) at a placement, mm.
+    pub fn aside_mm(&self, at: &DAffine3) -> f64 {
+        let center = self.center_of_mass();
+        let off = at.transform_point3(center) - self.way.seat.transform_point3(center);
+        off.reject_from_normalized(self.way.into).length()
+    }
+
     /// Travel of the part at a placement, mm: 0 in the fit, negative before it.
-    fn travel_mm(&self, at: &DAffine3) -> f64 {
+    pub fn travel_mm(&self, at: &DAffine3) -> f64 {
         let origin = at.transform_point3(self.target.moving.origin);
         let end = self.other.transform_point3(self.target.fixed.origin);
         (origin - end).dot(self.way.into)
@@ -367,6 +443,7 @@ impl Followed {
             off_rad: f64::NAN,
             peak_n: recording.outcome.peak_force_n,
             overlap_mm: overlap::penetration_mm(&self.scene, &recording.samples),
+            run_s: 1e-3 * f64::from(recording.outcome.ticks),
             missed: recording.outcome.missed_ticks,
             instructions: (recording.outcome.instructions_per_tick_max).map_or(f64::NAN, f64::from),
         };

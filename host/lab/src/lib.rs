@@ -26,6 +26,7 @@ pub mod fit;
 mod followed;
 mod generated;
 mod guided;
+pub mod helps;
 pub mod hybrid;
 mod least_distance;
 pub mod motion;

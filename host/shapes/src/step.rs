@@ -31,22 +31,29 @@ impl Side {
 /// A tube: its sides in order, and whether the material is inside.
 #[derive(Clone, Debug)]
 pub struct Tube {
+    /// Its sides, counter-clockwise seen from above.
     pub sides: Vec<Side>,
+    /// The material is inside.
     pub solid: bool,
 }
 
 /// A horizontal cap: whether it faces up, its outer loop and its holes, each the end (0 low, 1 high) of a tube.
 #[derive(Clone, Debug)]
 pub struct Cap {
+    /// It faces up.
     pub up: bool,
+    /// Tube and end of its outer loop.
     pub outer: (usize, usize),
+    /// Tubes and ends of its holes.
     pub holes: Vec<(usize, usize)>,
 }
 
 /// A solid of tubes and caps.
 #[derive(Clone, Debug, Default)]
 pub struct Solid {
+    /// Tubes.
     pub tubes: Vec<Tube>,
+    /// Caps of their ends.
     pub caps: Vec<Cap>,
 }
 

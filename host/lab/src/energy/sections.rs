@@ -4,9 +4,13 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec2, DVec3};
 use mortise_brep::Shape;
+use mortise_energy::BakedEnergy;
+use mortise_shapes::step::{Cap, Side, Solid, Tube, pair};
 use tempfile::NamedTempFile;
 
 use crate::LabError;
+use crate::followed::{Begin, Followed};
+use crate::guided;
 use crate::step_text::{StepText, prism};
 
 /// Half width of the block, its height, and the depth of the hole, mm; and the length of the peg.
@@ -82,6 +86,78 @@ impl Section {
         text.file()
     }
 
+    /// The pair with its geometric energy in the scene, and that energy.
+    pub fn followed(self) -> Result<(Followed, BakedEnergy), LabError> {
+        // The peg is seated in the file: the fit is where it has it.
+        let file = self.file(-DEPTH)?;
+        Followed::new(file.path(), ["peg", "block"])?.with_energy()
+    }
+
+    /// The same pair with cylinders for its chords, as it is felt: parts touch by their surfaces, and 64 chords would all touch apart. The peg is seated, and narrower
+    /// than the hole by a clearance.
+    pub fn round(self, clearance_mm: f64) -> Result<(Followed, BakedEnergy), LabError> {
+        let file = guided::file(&self.round_text(clearance_mm))?;
+        Followed::beginning(file.path(), ["moving", "fixed"], Begin::Seated)?.with_energy()
+    }
+
+    /// A STEP text of the parts `moving` and `fixed`, as [`Self::file`] has them with the foot in the hole's bottom.
+    fn round_text(self, clearance_mm: f64) -> String {
+        let peg = Solid {
+            tubes: vec![self.tube(RADIUS - 0.5 * clearance_mm, [-DEPTH, LENGTH - DEPTH], true)],
+            caps: [(false, 0), (true, 1)]
+                .map(|(up, end)| Cap {
+                    up,
+                    outer: (0, end),
+                    holes: Vec::new(),
+                })
+                .into(),
+        };
+        let cap = |up, outer, holes: &[(usize, usize)]| Cap {
+            up,
+            outer,
+            holes: holes.to_vec(),
+        };
+        let block = Solid {
+            tubes: vec![
+                Self::Square.tube(HALF, [-HEIGHT, 0.0], true),
+                self.tube(RADIUS, [-DEPTH, 0.0], false),
+            ],
+            caps: vec![
+                cap(false, (0, 0), &[]),
+                cap(true, (0, 1), &[(1, 1)]),
+                cap(true, (1, 0), &[]),
+            ],
+        };
+        pair(&peg, &block, [DAffine3::IDENTITY; 2])
+    }
+
+    /// A tube of this section with half of its width, counter-clockwise, between two heights.
+    fn tube(self, half: f64, heights: [f64; 2], solid: bool) -> Tube {
+        let at = |x: f64, y: f64| half * DVec2::new(x, y);
+        // Ends of the sides; each begins where the one before it ends.
+        let (corners, arcs) = match self {
+            Self::Circular => (vec![at(1.0, 0.0), at(-1.0, 0.0)], 2),
+            Self::Square => (
+                vec![at(1.0, 1.0), at(-1.0, 1.0), at(-1.0, -1.0), at(1.0, -1.0)],
+                0,
+            ),
+            Self::Combined => (vec![at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)], 1),
+        };
+        let sides = corners.iter().enumerate().map(|(k, &from)| {
+            let to = corners[(k + 1) % corners.len()];
+            let [low, high] = heights.map(|z| [from.extend(z), to.extend(z)]);
+            if k < arcs {
+                Side::Round(low, high, DVec3::ZERO)
+            } else {
+                Side::Flat(low, high)
+            }
+        });
+        Tube {
+            sides: sides.collect(),
+            solid,
+        }
+    }
+
     /// The shapes of the block and the peg, as in [`Self::file`]; the peg's foot is at its origin.
     pub fn shapes(self) -> Result<[Shape; 2], LabError> {
         let model = mortise_brep::load_step(self.file(0.0)?.path())?;
@@ -151,7 +227,33 @@ fn block(text: &mut StepText, corners: &[DVec2]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
+
+    /// Parts with cylinders have the volume of their section: a circle, a square, and three quarters of a circle with a quarter of the square.
+    #[test]
+    fn round_parts_have_the_volume_of_their_section() {
+        for (section, area) in Section::ALL.into_iter().zip([PI, 4.0, 0.75 * PI + 1.0]) {
+            let clearance = 0.1;
+            let file = guided::file(&section.round_text(clearance)).expect("written");
+            let model = mortise_brep::load_step(file.path()).expect("read");
+            let hole = area * RADIUS * RADIUS * DEPTH;
+            let narrow = RADIUS - 0.5 * clearance;
+            for (name, volume) in [
+                ("moving", area * narrow * narrow * LENGTH),
+                ("fixed", 4.0 * HALF * HALF * HEIGHT - hole),
+            ] {
+                let part = model.parts.iter().find(|part| part.name == name).expect(name);
+                let shape = &model.shapes[part.shape];
+                assert!(shape.closed, "{section:?} {name}");
+                assert!(
+                    (shape.volume_mm3 / volume - 1.0).abs() < 1e-9,
+                    "{section:?} {name}"
+                );
+            }
+        }
+    }
 
     /// The block's volume and the peg's agree with the section's area, by the CAD kernel.
     #[test]

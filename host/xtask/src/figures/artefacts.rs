@@ -65,6 +65,13 @@ const CHART: &[&str] = &["host/lab/src/chart", "host/lab/src/table.rs"];
 const SCENARIO: &[&str] = &["host/scenario/src/run.rs", "host/scenario/src/scene.rs"];
 const TRIAL: &[&str] = &["host/lab/src/clearance.rs"];
 const GUIDED: &[&str] = &["host/lab/src/guided.rs", "host/mating/src", "host/guide/src"];
+/// A pair of parts, its fit with the way in, and its geometric energy.
+const FOLLOWED: &[&str] = &[
+    "host/fit/src",
+    "host/mating/src",
+    "host/guide/src",
+    "host/energy/src",
+];
 
 /// Every command that writes to `docs/figures`.
 pub const ARTEFACTS: &[Artefact] = &[
@@ -165,8 +172,8 @@ pub const ARTEFACTS: &[Artefact] = &[
             LAW,
             LOOP,
             SCENARIO,
+            FOLLOWED,
             &[
-                "host/fit/src",
                 "host/shapes/src",
                 "host/lab/src/figures/guidance",
                 "host/lab/src/followed.rs",
@@ -213,13 +220,22 @@ pub const ARTEFACTS: &[Artefact] = &[
         name: "energy",
         made: Made::Sweep { quick: false },
         sources: &[
-            &[
-                "host/bake/src",
-                "host/brep/src",
-                "host/energy/src",
-                "host/lab/src/energy",
-            ],
+            LAW,
+            SCENARIO,
+            FOLLOWED,
             CHART,
+            &["host/lab/src/energy", "host/lab/src/followed.rs"],
+        ],
+    },
+    Artefact {
+        name: "helps",
+        made: Made::Sweep { quick: false },
+        sources: &[
+            LAW,
+            SCENARIO,
+            FOLLOWED,
+            CHART,
+            &["host/lab/src/helps.rs", "host/lab/src/followed.rs"],
         ],
     },
     Artefact {

@@ -1,6 +1,7 @@
 //! Guidance for parts of any shape: a fit that the finder found is followed, with recognition off.
 
 mod energy;
+mod felt;
 mod insertion;
 
 use super::{Plan, Row};
@@ -11,5 +12,6 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     insertion::shared_shapes(plan, out)?;
     insertion::random_shapes(plan, out)?;
     insertion::starts(plan, out)?;
-    energy::measure(plan, out)
+    energy::measure(plan, out)?;
+    felt::measure(plan, out)
 }
