@@ -37,6 +37,7 @@ const VERBS: &[&str] = &[
     "Cap",
     "Carry",
     "Change",
+    "Charge",
     "Chart",
     "Check",
     "Choose",
