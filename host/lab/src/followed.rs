@@ -30,8 +30,11 @@ const BEYOND_MM: f64 = 2.0;
 const SPEED_MM_S: f64 = 25.0;
 /// Ticks after full engagement until a part is on its way: 1 mm decays below 1 µm with τ = 20 ms.
 const SETTLING_TICKS: u32 = 150;
-/// A part that comes so near to the end of its way is in, mm.
-pub(crate) const IN_MM: f64 = 0.1;
+/// A part that comes so near to the end of its way is in, mm, where it is on the way and turned as there: no farther off than this, mm and rad, more than
+/// walls allow in any fit that is inserted, and far less than a part that slips from the hand and lies across the mouth.
+const IN_MM: f64 = 0.1;
+const IN_ASIDE_MM: f64 = 0.5;
+const IN_TURNED_RAD: f64 = 0.02;
 /// Time of a careless hand from one place to the next, s, and how far it goes aside and out, mm, and turns, rad.
 const WANDER_S: f64 = 0.25;
 const WANDER_MM: f64 = 5.0;
@@ -435,6 +438,13 @@ impl Followed {
         (origin - end).dot(self.way.into)
     }
 
+    /// Whether a part with this placement is in its fit.
+    pub fn is_in(&self, at: &DAffine3) -> bool {
+        let off = self.target.alignment_error(at, &self.other);
+        let on_way = off.distance_mm < IN_ASIDE_MM && off.angle_rad < IN_TURNED_RAD;
+        on_way && self.travel_mm(at) > -IN_MM
+    }
+
     fn seen(&self, recording: &Recording) -> Seen {
         let mut seen = Seen {
             is_in: false,
@@ -452,8 +462,7 @@ impl Followed {
         for sample in &recording.samples {
             let Some((_, pose)) = &sample.object else { continue };
             let at = pose_mm(pose);
-            let is_in = self.travel_mm(&at) > -IN_MM;
-            if is_in && !seen.is_in {
+            if !seen.is_in && self.is_in(&at) {
                 seen.is_in = true;
                 seen.after_s = 1e-3 * f64::from(sample.tick - first);
             }

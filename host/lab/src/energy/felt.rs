@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
-use crate::followed::{Followed, IN_MM, Wanted};
+use crate::followed::{Followed, Wanted};
 
 /// Ticks a second.
 const TICK_HZ: f64 = 1000.0;
@@ -158,8 +158,8 @@ pub(crate) struct Moment {
     /// Distance of the peg's centre of mass from the way, mm; how far it is turned from the fit, rad.
     pub aside_mm: f64,
     pub turned_rad: f64,
-    /// Travel from the fit along the way, mm: negative before it.
-    pub travel_mm: f64,
+    /// Whether it is in the fit.
+    pub is_in: bool,
 }
 
 /// What a test showed.
@@ -226,7 +226,7 @@ fn moments(followed: &Followed, recording: &Recording) -> Vec<Moment> {
             turned_rad: DQuat::from_mat3(&(at.matrix3 * seat.matrix3.inverse()))
                 .to_scaled_axis()
                 .length(),
-            travel_mm: followed.travel_mm(&at),
+            is_in: followed.is_in(&at),
         })
     });
     moments.collect()
@@ -245,8 +245,7 @@ impl Felt {
         for approach in self.runs.iter().flat_map(|run| run.chunks_exact(whole)) {
             count[0] += 1;
             count[1] += usize::from((approach.last()).is_some_and(|moment| moment.aside_mm < ON_WAY_MM));
-            let is_in = |moment: &Moment| moment.travel_mm > -IN_MM;
-            count[2] += usize::from(approach[stays..].iter().any(is_in));
+            count[2] += usize::from(approach[stays..].iter().any(|moment| moment.is_in));
         }
         Some(count)
     }
@@ -520,20 +519,20 @@ mod tests {
 
     #[test]
     fn approaches_are_counted_by_their_ends() {
-        let moment = |aside_mm: f64, travel_mm: f64| Moment {
+        let moment = |aside_mm: f64, is_in: bool| Moment {
             force: DVec3::ZERO,
             aside_mm,
             turned_rad: 0.0,
-            travel_mm,
+            is_in,
         };
         // Off its way and outside; on its way and outside; on its way and in at last; in only before the hand stays.
-        let mut run = vec![moment(1.0, -30.0); 4000];
+        let mut run = vec![moment(1.0, false); 4000];
         for tick in 0..1000 {
             run[1000 + tick].aside_mm = 0.1;
             run[2000 + tick].aside_mm = 0.1;
         }
-        run[2999].travel_mm = 0.0;
-        run[3000].travel_mm = 0.0;
+        run[2999].is_in = true;
+        run[3000].is_in = true;
         let felt = Felt {
             test: Test::Snap,
             runs: vec![run],
