@@ -118,12 +118,12 @@ impl Session {
                 basin: Arc::new(basin(&energy, &stations(&model, &of, &fit), middle)),
                 energy,
             });
-            outbox.send(Update::Energy(EnergyMade {
+            outbox.send(Update::Energy(Box::new(EnergyMade {
                 cancel,
                 model,
                 of,
                 made,
-            }));
+            })));
         });
     }
 

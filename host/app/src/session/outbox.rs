@@ -84,7 +84,7 @@ pub enum Update {
     /// The ways of a part in the assembly were searched.
     Ways(WaysFound),
     /// Making the energy of a fit ended.
-    Energy(EnergyMade),
+    Energy(Box<EnergyMade>),
     /// A file was chosen in a dialog.
     Chosen(Purpose, PathBuf),
     /// No file dialog is available: the window must ask for a path.

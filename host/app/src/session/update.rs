@@ -90,7 +90,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         Update::Fits(found) => session.fits_found(found),
         Update::Sequence(found) => session.sequencing.take_in(found),
         Update::Ways(found) => session.ways_found(found),
-        Update::Energy(end) => session.energy_made(end),
+        Update::Energy(end) => session.energy_made(*end),
         Update::Chosen(purpose, path) => return Some(answer(purpose, path, true)),
         Update::NoDialog(purpose) => session.wants_path = Some(purpose),
         Update::Missing(missing) => session.missing = missing,
