@@ -433,6 +433,33 @@ mod tests {
     }
 
     proptest! {
+        /// No place of a piece is in a sphere that the piece is not near to, and a sphere whose nearest place on the chord is beyond the bulge is not near.
+        #[test]
+        fn a_piece_is_near_where_it_reaches(
+            center in prop::array::uniform3(-0.02f32..0.02),
+            half in prop::array::uniform3(-0.05f32..0.05),
+            bend in prop::array::uniform3(-0.01f32..0.01),
+            sphere in prop::array::uniform3(-0.1f32..0.1),
+            radius in 1e-4f32..0.05,
+            reach in 0f32..2e-3,
+        ) {
+            let record = edge(center, half, bend, [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]);
+            let piece = Piece::fixed(&record);
+            let sphere = Vec3::from_array(sphere);
+            let (mut on_piece, mut on_chord) = (f32::INFINITY, f32::INFINITY);
+            for i in -200..=200 {
+                let t = i as f32 / 200.0;
+                on_piece = on_piece.min((piece.at(t) - sphere).length());
+                on_chord = on_chord.min((piece.center + piece.half * t - sphere).length());
+            }
+            let near = piece.is_near((sphere, radius), reach);
+            // Rounding of lengths below a metre.
+            prop_assert!(near || on_piece > radius + reach - 1e-6);
+            // The places tried on the chord are half a step from the nearest at most.
+            let step = piece.half.length() / 200.0;
+            prop_assert!(!near || on_chord <= piece.bulge + radius + reach + step + 1e-6);
+        }
+
         /// A circle's quadratic pieces against a straight edge: the gap is that of the closed form, whatever the part of the circle.
         #[test]
         fn an_arc_crosses_a_line(angle in -0.19f32..0.19, height in -40e-6f32..1e-3, slant in -0.6f32..0.6) {

@@ -10,7 +10,7 @@
 //! points are the bulk of the work: each second, fourth or eighth near point is queried where points take a quarter of the budget; where they still
 //! take half of it, whole leaves are decimated, down to each 128th point. The selection stays the same until the budget suffices again
 //! ([`super::decimation`]). The error bound of the pointshell grows by a factor of four at each step; all else stays as it was. Carrying over is
-//! prepared once a tick has needed half of the budget.
+//! prepared once a tick has needed half of the budget, and paid for before the search from three quarters of it at most.
 //!
 //! Cost: see [`crate::tick()`]; field queries are two thirds of it.
 
