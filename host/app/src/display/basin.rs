@@ -142,7 +142,10 @@ mod tests {
     const NODES: u16 = 31;
     const FADED_MM: f64 = 10.0;
 
-    /// One charge in a density that fades evenly about the origin: the depth is 1 − d/10 mm.
+    /// Middle of the moving part, its frame, mm.
+    const MIDDLE: DVec3 = DVec3::new(3.0, 0.0, 2.0);
+
+    /// One charge at the middle of the part in a density that fades evenly about the origin: with the middle at a distance d the depth is 1 − d/10 mm.
     fn round() -> BakedEnergy {
         let middle = 0.5 * f64::from(NODES - 1);
         let node = |i: u16| f64::from(i) - middle;
@@ -161,7 +164,7 @@ mod tests {
                 ..EnergyRecord::default()
             },
             charges: vec![ChargeRecord {
-                at: [0.0; 3],
+                at: (MIDDLE * 1e-3).as_vec3().to_array(),
                 charge: [1.0 / 127.0, 0.0],
             }],
             nodes: nodes.map(density).collect(),
@@ -171,11 +174,10 @@ mod tests {
 
     #[test]
     fn each_shell_is_where_the_energy_has_its_share_of_the_depth() {
-        let middle = DVec3::new(3.0, 0.0, 2.0);
         let poses: Vec<DAffine3> = (-12..=12)
-            .map(|z| DAffine3::from_translation(f64::from(z) * DVec3::Z - middle))
+            .map(|z| DAffine3::from_translation(f64::from(z) * DVec3::Z - MIDDLE))
             .collect();
-        let mesh = basin(&round(), &poses, middle);
+        let mesh = basin(&round(), &poses, MIDDLE);
         assert_eq!(mesh.vertices.len(), LEVELS.len() * poses.len() * AROUND);
         for (level, shell) in LEVELS.iter().zip(mesh.vertices.chunks(poses.len() * AROUND)) {
             let want = FADED_MM * (1.0 - level);
