@@ -149,7 +149,7 @@ impl eframe::App for App {
 
     fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
         let theme = egui::Theme::from_dark_mode(visuals.dark_mode);
-        theme::palette(theme).ground.to_normalized_gamma_f32()
+        theme::palette(theme).panel.to_normalized_gamma_f32()
     }
 }
 

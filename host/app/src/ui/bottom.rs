@@ -31,7 +31,7 @@ pub fn show(ui: &mut Ui, session: &mut Session, view: &mut plots::View, wanted: 
     Panel::bottom(name)
         .default_size(usual)
         .size_range(140.0..=f32::max(most, 140.0))
-        .frame(theme::panel(theme::of(ui)))
+        .frame(theme::panel())
         .show(ui, |ui| {
             Panel::right("messages")
                 .default_size(400.0)
@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, session: &mut Session, view: &mut plots::View, wanted: 
 
 /// Draws the folded panel: a line with the newest message.
 fn folded(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
-    let tight = theme::panel(theme::of(ui)).inner_margin(Margin::symmetric(8, 4));
+    let tight = theme::panel().inner_margin(Margin::symmetric(8, 4));
     Panel::bottom("folded below")
         .resizable(false)
         .frame(tight)

@@ -49,7 +49,7 @@ impl CommandLine {
         }
         let drawn = egui::Panel::top("command line")
             .resizable(false)
-            .frame(theme::panel(theme::of(ui)).inner_margin(egui::Margin::symmetric(14, 8)))
+            .frame(theme::panel().inner_margin(egui::Margin::symmetric(14, 8)))
             .show(ui, |ui| {
                 self.line(ui, session, wanted);
                 self.below(ui, session, wanted);

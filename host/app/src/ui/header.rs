@@ -60,7 +60,7 @@ pub fn show(ui: &mut Ui, session: &Session, help: &mut bool, wanted: &mut Vec<In
         .exact_size(shape.height())
         .resizable(false)
         .show_separator_line(false)
-        .frame(theme::panel(theme::of(ui)).inner_margin(shape.margin))
+        .frame(theme::panel().inner_margin(shape.margin))
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing = Vec2::new(GAP, 4.0);
             let row = Vec2::new(ui.available_width(), shape.stop.y);

@@ -80,7 +80,7 @@ pub fn set_up(ctx: &egui::Context) {
     appearance::follow(ctx);
 }
 
-/// Time between redraws while the motors are off and the handle rests. With software rendering a frame of 1600 × 1000 pixels costs up to 0.7 s of a core.
+/// Time between redraws while the motors are off and the handle rests. With software rendering a redraw of 1600 × 1000 pixels costs up to 0.25 s of a core.
 /// Motion and changes of state are drawn at once.
 const CALM: Duration = Duration::from_secs(60);
 
@@ -245,7 +245,7 @@ impl Window {
             egui::Panel::right("rig")
                 .exact_size(336.0)
                 .resizable(false)
-                .frame(theme::panel(theme::of(ui)))
+                .frame(theme::panel())
                 .show(ui, |ui| rig::show(ui, session, wanted));
         }
         self.picture(ui, surface, wanted);
@@ -256,7 +256,7 @@ impl Window {
         egui::Panel::left("runs")
             .default_size(420.0)
             .size_range(260.0..=700.0)
-            .frame(theme::panel(theme::of(ui)))
+            .frame(theme::panel())
             .show(ui, |ui| runs::show(ui, &self.session, &mut self.runs, wanted));
     }
 
@@ -266,7 +266,7 @@ impl Window {
         egui::Panel::left("parts")
             .default_size(248.0)
             .size_range(180.0..=420.0)
-            .frame(theme::panel(theme::of(ui)))
+            .frame(theme::panel())
             .show(ui, |ui| {
                 self.below.show(ui, session, &mut self.view, wanted);
                 egui::CentralPanel::default()
@@ -292,7 +292,7 @@ impl Window {
         surface: Option<&mut Surface>,
         wanted: &mut Vec<Intent>,
     ) {
-        let tight = theme::panel(theme::of(ui)).inner_margin(egui::Margin::symmetric(8, 6));
+        let tight = theme::panel().inner_margin(egui::Margin::symmetric(8, 6));
         egui::Panel::top("tabs")
             .resizable(false)
             .frame(tight)
@@ -346,12 +346,12 @@ impl Window {
         let session = &mut self.session;
         if session.workspace == Workspace::Rig {
             egui::CentralPanel::default()
-                .frame(theme::panel(theme::of(ui)))
+                .frame(theme::panel())
                 .show(ui, |ui| rig_page::show(ui, session, wanted));
             return;
         }
         egui::CentralPanel::default()
-            .frame(egui::Frame::NONE.fill(theme::of(ui).ground))
+            .frame(egui::Frame::NONE)
             .show(ui, |ui| {
                 let rect = ui.available_rect_before_wrap();
                 view::show(ui, session, &mut self.view, surface, wanted);

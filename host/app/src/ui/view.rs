@@ -29,8 +29,10 @@ pub fn show(
     let rect = ui.available_rect_before_wrap();
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
-    ui.painter()
-        .rect_filled(rect, CornerRadius::ZERO, theme::of(ui).ground);
+    if surface.is_none() || session.document.is_none() {
+        ui.painter()
+            .rect_filled(rect, CornerRadius::ZERO, theme::of(ui).ground);
+    }
     if session.document.is_none() {
         empty(ui, rect, session, wanted);
         return;
@@ -55,9 +57,8 @@ pub fn show(
             scale,
         };
         let picture = compose(session, document, &look);
-        if let Some(texture) = surface.show(&document.meshes, picture, size) {
-            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-            ui.painter().image(texture, rect, whole, Color32::WHITE);
+        if let Some(shown) = surface.show(&document.meshes, picture, rect, size) {
+            ui.painter().add(shown);
         }
     }
     touching(ui, rect, session, view);

@@ -14,6 +14,7 @@ pub mod picture;
 mod pipelines;
 pub mod renderer;
 pub mod screen;
+mod shown;
 pub mod six_axis;
 pub mod snap;
 mod solids;

@@ -1,20 +1,19 @@
-//! The renderer's texture as an image of the window.
+//! The renderer's picture as a part of the window.
 
 use std::sync::Arc;
 
 use eframe::egui_wgpu::RenderState;
-use eframe::wgpu;
-use egui::TextureId;
+use egui::{PaintCallback, Rect};
 
 use super::picture::Picture;
 use super::renderer::Renderer;
+use super::shown::Shown;
 use crate::display::mesh::ShapeMesh;
 
 /// Draws pictures into a texture that the window displays; an unchanged picture is not drawn again.
 pub struct Surface {
-    state: RenderState,
     renderer: Renderer,
-    texture: Option<TextureId>,
+    shown: Shown,
     meshes: Option<Arc<Vec<ShapeMesh>>>,
     last: Option<Picture>,
 }
@@ -24,20 +23,20 @@ impl Surface {
     pub fn new(state: &RenderState) -> Self {
         Self {
             renderer: Renderer::new(&state.device, &state.queue),
-            state: state.clone(),
-            texture: None,
+            shown: Shown::new(&state.device, state.target_format),
             meshes: None,
             last: None,
         }
     }
 
-    /// The texture of the picture, `size` pixels large.
+    /// Draws the picture, and returns what shows it over `rect`, which is `size` pixels large.
     pub fn show(
         &mut self,
         meshes: &Arc<Vec<ShapeMesh>>,
         picture: Picture,
+        rect: Rect,
         size: [u32; 2],
-    ) -> Option<TextureId> {
+    ) -> Option<PaintCallback> {
         let same_meshes = self
             .meshes
             .as_ref()
@@ -49,21 +48,12 @@ impl Surface {
         let fresh = self.renderer.resize(size);
         if fresh {
             let (_, view) = self.renderer.texture()?;
-            let mut window = self.state.renderer.write();
-            let filter = wgpu::FilterMode::Linear;
-            match self.texture {
-                Some(id) => {
-                    window.update_egui_texture_from_wgpu_texture(&self.state.device, view, filter, id);
-                }
-                None => {
-                    self.texture = Some(window.register_native_texture(&self.state.device, view, filter));
-                }
-            }
+            self.shown.set(view);
         }
         if fresh || !same_meshes || self.last.as_ref() != Some(&picture) {
             self.renderer.render(&picture);
             self.last = Some(picture);
         }
-        self.texture
+        self.shown.over(rect)
     }
 }

@@ -8,6 +8,7 @@ use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::DAffine3;
+use mortise::folder_cache::FolderCache;
 use mortise::kept::StateFolder;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session};
@@ -28,6 +29,18 @@ pub fn harness() -> Harness<'static, Window> {
 /// A window whose egui context `setup` has configured.
 pub fn harness_with(setup: impl FnOnce(&egui::Context) + 'static) -> Harness<'static, Window> {
     harness_of(Session::new(Arc::new(|| {})), setup)
+}
+
+/// A window with a cache, which all windows of this kind share and which stays for the next run of this program: what one has baked or made, others
+/// read.
+pub fn harness_with_cache() -> Harness<'static, Window> {
+    let program = std::env::current_exe()
+        .and_then(std::fs::read)
+        .expect("this program");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("window-cache");
+    let cache = FolderCache::new(folder, &program, 64 << 20);
+    let session = Session::new(Arc::new(|| {}));
+    harness_of(session.with_cache(Some(cache)), theme::apply)
 }
 
 /// A window that keeps what its user does in a folder.

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::common::{arm, click, connect, harness, open_sample, poses, press, texts, until, worst};
+use crate::common::{
+    arm, click, connect, harness, harness_with_cache, open_sample, poses, press, texts, until, worst,
+};
 use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
@@ -24,9 +26,12 @@ fn guide_by_energy(harness: &mut Harness<'_, Window>) {
     assert!(harness.state().session.guides_by_energy());
 }
 
-/// The connected sample with the peg selected, and guidance by energy.
+/// The connected sample with the peg selected, and guidance by energy, which is made anew.
 fn begun() -> Harness<'static, Window> {
-    let mut harness = harness();
+    begun_in(harness())
+}
+
+fn begun_in(mut harness: Harness<'static, Window>) -> Harness<'static, Window> {
     open_sample(&mut harness);
     connect(&mut harness);
     click(&mut harness, "peg");
@@ -39,8 +44,9 @@ fn is_there(session: &Session) -> bool {
     session.scene_is_on_board() && !session.scene_energies().is_empty() && session.why_not_drawn().is_none()
 }
 
+/// As [`begun`], with the energy on the board, read from the cache where another test has made it.
 fn made() -> Harness<'static, Window> {
-    let mut harness = begun();
+    let mut harness = begun_in(harness_with_cache());
     until(&mut harness, "the energy is on the board", is_there);
     harness.run_steps(2);
     harness

@@ -25,7 +25,7 @@ const COLOURS_MIN: u32 = 64;
 const SCREEN: (u32, u32) = (1600, 1000);
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 /// Largest processor time of drawing in an idle minute by software, in times of [`bake_s`] on the same computer, whose speed cancels out.
-const DRAWING_MAX: f64 = 5.0;
+const DRAWING_MAX: f64 = 1.5;
 /// Largest processor time of the program's own threads in an idle minute, as a share of a core. They wait, a thousand times a second for the rig's ticks, which
 /// takes about as long on a fast computer as on a slow one.
 const WAITING_MAX: f64 = 0.07;
