@@ -97,6 +97,8 @@ parameters! {
     Shrinking = "voxels", 0.0, 1.0, 0.0;
     /// Largest force of a geometric energy.
     GeometricForce = "N", 0.0, 10.0, 3.0;
+    /// How many times as far as the handle the held part moves; a change holds from the next grab on. Forces are scaled alike, so that stiffness is felt times its square.
+    PositionScale = "times", 0.1, 10.0, 1.0;
 }
 
 impl ParameterId {

@@ -10,6 +10,7 @@
 
 pub mod fingerprint;
 mod parts;
+mod position_scale;
 mod recording;
 mod report;
 mod requests;
@@ -25,6 +26,7 @@ use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{Fault, Refusal};
 
 use self::parts::{Host, Lateness, Lockstep, Recording, Rendered, Reports, Sampling, Testing};
+use self::position_scale::PositionScale;
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
 use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Epoch, Reply};
 use crate::parameters::ControlSettings;
@@ -295,9 +297,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.rendered.output = None;
         let motors = self.safety.motors();
         if let (Motors::Zero | Motors::Rendered, Some(scene)) = (motors, &self.scene) {
+            let scale = self.rendered.scale;
+            let (handle, handle_twist) = scale.handle(&self.sensed);
             let input = Input {
-                handle: self.sensed.handle,
-                handle_twist: self.sensed.twist,
+                handle,
+                handle_twist,
                 enabled: true,
             };
             self.rendered.ramp = self.rendered.ramp.saturating_add(1).min(RAMP_TICKS);
@@ -306,13 +310,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             let passivity = &mut self.settings.law.passivity;
             (passivity.position_count_m, passivity.angle_count_rad) = (position, angle);
             self.ends.law.set_slipping(ramping);
-            let ramped;
-            let law = if ramping {
-                ramped = loosened(
-                    &self.settings.law,
-                    f32::from(self.rendered.ramp) / f32::from(RAMP_TICKS),
-                );
-                &ramped
+            let adapted;
+            let law = if ramping || scale != PositionScale::ONE {
+                let share = f32::from(self.rendered.ramp) / f32::from(RAMP_TICKS);
+                adapted = scale.law(&loosened(&self.settings.law, share));
+                &adapted
             } else {
                 &self.settings.law
             };
@@ -329,7 +331,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         let wanted = match (self.safety.motors(), &self.rendered.output) {
             (Motors::Off | Motors::Tested, _) => None,
             (Motors::Fading, _) => Some(self.fading()),
-            (Motors::Zero | Motors::Rendered, Some(output)) => Some(output.handle),
+            (Motors::Zero | Motors::Rendered, Some(output)) => Some(self.rendered.scale.felt(output.handle)),
             (Motors::Zero | Motors::Rendered, None) => Some(Wrench::ZERO),
         };
         let allowed = wanted.map(|wrench| self.restrained(wrench));

@@ -204,6 +204,9 @@ settings_group! {
         position_count_m: f32 = 0.0, 0.0 => 1e-3;
         /// The same for its orientation, rad.
         angle_count_rad: f32 = 0.0, 0.0 => 0.1;
+        /// How many times as far as the real handle the one of the tick moves: it may accelerate so many times as fast, and its mass is that of the real
+        /// one over the square.
+        position_scale: f32 <- PositionScale, 0.1 => 10.0;
     }
 }
 

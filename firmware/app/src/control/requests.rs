@@ -3,8 +3,10 @@
 use mortise_haptics::{GrabError, PlaceError, Pose, TargetError, Twist, Wrench};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{ConstraintTarget, Fault, Refusal};
+use mortise_protocol::parameter::ParameterId;
 
 use super::ControlPlane;
+use super::position_scale::PositionScale;
 use crate::board::{Clock, Mechanism};
 use crate::channel::{CommandKind, Event, Reply};
 use crate::safety::{Action, Event as SafetyEvent};
@@ -27,6 +29,7 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
             }
             CommandKind::Settings(settings) => {
                 self.settings = settings;
+                self.adopt_scale();
                 Ok(())
             }
             CommandKind::Grab(part) => self.grab(part),
@@ -119,15 +122,17 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
     }
 
     fn grab(&mut self, part: u16) -> Result<(), Refusal> {
+        self.adopt_scale();
         let Some(scene) = &self.scene else {
             return Err(Refusal::NoScene);
         };
         if let (_, Action::Refuse(reason)) = self.safety.step(SafetyEvent::Grab) {
             return Err(reason);
         }
+        let (handle, _) = self.rendered.scale.handle(&self.sensed);
         self.ends
             .law
-            .grab(scene, part, &self.sensed.handle)
+            .grab(scene, part, &handle)
             .map_err(|error| match error {
                 GrabError::NoSuchPart { parts, .. } => Refusal::NoSuchPart { parts },
                 GrabError::Fixed { .. } => Refusal::NotGrabbable,
@@ -135,6 +140,17 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
                 GrabError::BadHandle => Refusal::BadNumber,
             })?;
         self.request(SafetyEvent::Grab)
+    }
+
+    /// Takes over the position scale of the settings, unless a part is held: that would jump. What is left of the last part's force ends.
+    fn adopt_scale(&mut self) {
+        let scale = PositionScale(self.settings.parameters.get(ParameterId::PositionScale));
+        if self.ends.law.grabbed().is_none() && scale != self.rendered.scale {
+            self.rendered.scale = scale;
+            self.ends.law.restart_slew();
+        }
+        // With another one in use this tick's bounds are those of another handle.
+        self.settings.law.passivity.position_scale = self.rendered.scale.0;
     }
 
     fn set_target(&mut self, target: &ConstraintTarget) -> Result<(), Refusal> {

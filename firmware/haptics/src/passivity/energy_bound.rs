@@ -228,8 +228,11 @@ impl EnergyBound {
         let passivity = &settings.passivity;
         let ticks = (1 + pending.len()) as f32;
         let h = settings.period_s;
+        let scale = passivity.position_scale;
         let slack = Twist {
-            linear: Vec3::splat(ACCELERATION * (h * ticks) * (h * ticks) + passivity.position_count_m),
+            linear: Vec3::splat(
+                scale * ACCELERATION * (h * ticks) * (h * ticks) + passivity.position_count_m,
+            ),
             angular: Vec3::splat(
                 ANGULAR_ACCELERATION * (h * ticks) * (h * ticks) + passivity.angle_count_rad,
             ),
@@ -245,7 +248,8 @@ impl EnergyBound {
             |w: &Wrench| h * power(w) + w.force.abs().dot(slack.linear) + w.torque.abs().dot(slack.angular);
         let squared = |w: &Wrench| {
             h * delay
-                * (w.force.length_squared() / LEAST_MASS_KG + w.torque.length_squared() / LEAST_INERTIA_KG_M2)
+                * (scale * scale * w.force.length_squared() / LEAST_MASS_KG
+                    + w.torque.length_squared() / LEAST_INERTIA_KG_M2)
         };
         let mut available = self.available(power(&wrench), passivity.initial_budget_j);
         for w in pending {
