@@ -7,7 +7,6 @@ use mortise_protocol::message::{DeviceState, ToDevice};
 use super::insertion::{Manner, script};
 use super::intent::Intent;
 use super::notes::Severity;
-use super::pose;
 use super::state::Session;
 use super::tour::{Step, Tour};
 
@@ -109,8 +108,8 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
         }
         Step::Play => {
             let insertion = session.document.as_ref()?.insertion?;
-            let handle = session.telemetry.as_ref()?.handle;
-            let hand = script(&insertion, &pose::from_wire(&handle), &Manner::default());
+            let hand = script(&insertion, &session.scaled_handle()?, &Manner::default());
+            let hand = session.for_handle(hand);
             if let Some(connection) = session.connection_mut() {
                 connection.set_hand(hand);
             }

@@ -358,9 +358,10 @@ impl Session {
         }
     }
 
-    /// Moves the simulated hand; no effect on a rig with a real one.
+    /// Moves the simulated hand, which has the scaled handle follow a script; no effect on a rig with a real one.
     pub fn move_hand(&mut self, script: HandScript) {
         self.tour = None;
+        let script = self.for_handle(script);
         if let Some(connection) = self.connection_mut()
             && connection.capabilities.simulated
         {

@@ -22,6 +22,7 @@ use super::energies::Energies;
 use super::fits::FitChoice;
 use super::fitting::Fitting;
 use super::flashing::Flashing;
+use super::held::Held;
 use super::history::History;
 use super::instructions::Instructions;
 use super::joints::Joints;
@@ -177,8 +178,8 @@ pub struct Session {
     /// The project that the user opened, and its file: for the document of this number.
     pub(super) pending_project: Option<(u64, Box<Project>, PathBuf)>,
     pub(super) tour: Option<Tour>,
-    /// Held part, and its pose in the handle's frame when it was grabbed.
-    pub(super) held: Option<(usize, DAffine3)>,
+    /// Held part.
+    pub(super) held: Option<Held>,
     /// The part that is held again when the clutch closes.
     pub(super) clutched: Option<usize>,
     pub(super) outbox: Outbox,
@@ -350,9 +351,8 @@ impl Session {
     /// Held part and the pose that the handle commands, mm: it differs from the part's own pose by the coupling's deflection under contact.
     pub fn ghost(&self) -> Option<(usize, DAffine3)> {
         let part = self.grabbed()?;
-        let (held, offset) = self.held.as_ref()?;
-        let handle = pose::from_wire(&self.telemetry.as_ref()?.handle);
-        (*held == part).then(|| (part, handle * *offset))
+        let held = self.held.filter(|held| held.part == part)?;
+        Some((part, held.commanded(&self.telemetry.as_ref()?.handle)))
     }
 
     /// Pose of the handle, mm.

@@ -11,6 +11,7 @@ use mortise_rig::{Client, Event, describe};
 use super::ask::answer;
 use super::document::Document;
 use super::grouped::Grouped;
+use super::held::Held;
 use super::history::Sample;
 use super::insertion::Wall;
 use super::intent::Intent;
@@ -325,8 +326,9 @@ fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
     {
         let object = pose::from_wire(object);
         document.put(part, object);
-        if session.held.is_none_or(|(held, _)| held != part) {
-            session.held = Some((part, pose::from_wire(&telemetry.handle).inverse() * object));
+        if session.held.is_none_or(|held| held.part != part) {
+            let scale = session.chosen_position_scale();
+            session.held = Some(Held::new(part, scale, &telemetry.handle, &object));
             session.verdict = None;
         }
         watch(session, part, &telemetry, &sample);

@@ -56,13 +56,16 @@ fn contents(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             return;
         }
     };
-    let Some(limits) = session.limits.of(&subject) else {
+    let Some(limits) = session.limits.of(&subject, session.chosen_position_scale()) else {
         return weak(
             ui,
             "No force is rendered in any posture of the described mechanism",
         );
     };
     weak(ui, &format!("Of {}. {}", limits.name, words::class()));
+    if let Some(scaled) = words::scaled(limits.scale) {
+        weak(ui, &scaled);
+    }
     for plane in &limits.planes {
         one(ui, plane, &plane.margin(&session.parameters));
     }

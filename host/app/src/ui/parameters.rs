@@ -19,10 +19,14 @@ fn is_of_guidance(row: &Parameter) -> bool {
 /// First word of the parameters of the coupling, below which its stability margin is drawn.
 const COUPLING: &str = "Coupling";
 
+/// First word of the parameters that say how far the handle reaches.
+const POSITION: &str = "Position";
+
 /// First word of the parameters' names in a group, and the group's heading.
-const GROUPS: [(&str, &str); 5] = [
+const GROUPS: [(&str, &str); 6] = [
     ("Integrator", "Method"),
     (COUPLING, "Coupling of handle and part"),
+    (POSITION, "Reach of the handle"),
     ("Contact", "Contact"),
     ("Object", "Held part"),
     ("", "Limits"),
@@ -58,7 +62,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             .open
             .get(*heading)
             .copied()
-            .unwrap_or(index < 3);
+            .unwrap_or(index < 4);
         let section = egui::CollapsingHeader::new(*heading)
             .default_open(open)
             .show_unindented(ui, |ui| {
@@ -70,6 +74,11 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 }
                 if *word == COUPLING {
                     margin::show(ui, session, wanted);
+                }
+                if *word == POSITION
+                    && let Some(effect) = session.position_scale_in_words()
+                {
+                    ui.label(RichText::new(effect).small().color(theme::of(ui).text));
                 }
                 ui.add_space(4.0);
             });

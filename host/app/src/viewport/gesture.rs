@@ -230,7 +230,7 @@ impl Viewpoint {
         let under = document.and_then(|document| self.pick(document, response.rect, pressed));
         self.drag = Some(Drag::Orbit(under.map_or(self.camera.target, |hit| hit.point)));
         let simulated = session.connection().is_some_and(|c| c.capabilities.simulated);
-        let (Some(_), Some(handle)) = (session.grabbed(), session.handle()) else {
+        let (Some(_), Some(handle)) = (session.grabbed(), session.scaled_handle()) else {
             return;
         };
         if left

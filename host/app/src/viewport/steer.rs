@@ -60,7 +60,7 @@ impl Viewpoint {
             return Subject::View;
         }
         let simulated = session.connection().is_some_and(|c| c.capabilities.simulated);
-        if let (true, Some(_), Some(handle)) = (simulated, session.grabbed(), session.handle()) {
+        if let (true, Some(_), Some(handle)) = (simulated, session.grabbed(), session.scaled_handle()) {
             return Subject::Hand(handle);
         }
         let selected =
@@ -85,7 +85,7 @@ impl Viewpoint {
     }
 
     fn steer_hand(&self, goal: DAffine3, by: [DVec3; 2], session: &mut Session) -> Subject {
-        let (Some(part), Some(handle)) = (session.grabbed(), session.handle()) else {
+        let (Some(part), Some(handle)) = (session.grabbed(), session.scaled_handle()) else {
             return Subject::Nothing;
         };
         let Some(middle) = session.document.as_ref().and_then(|d| d.middle(part)) else {

@@ -32,6 +32,7 @@ mod picture;
 mod playback;
 mod plots;
 mod project;
+mod reach;
 mod recording;
 mod rig_page;
 mod said_once;

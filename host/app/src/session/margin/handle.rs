@@ -35,6 +35,23 @@ pub struct HandleAxis {
     pub count: f64,
 }
 
+impl HandleAxis {
+    /// As the force law has it with this position scale: it moves so many times as far, at the same power.
+    fn scaled(self, scale: f64) -> Self {
+        let square = scale * scale;
+        Self {
+            axis: Axis {
+                inertia: self.axis.inertia / square,
+                viscous: self.axis.viscous / square,
+                resting: self.axis.resting / square,
+                ..self.axis
+            },
+            coulomb: self.coulomb / scale,
+            count: self.count * scale,
+        }
+    }
+}
+
 /// A handle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Handle {
@@ -44,6 +61,16 @@ pub struct Handle {
     pub translation: HandleAxis,
     /// Where motors turn it; `None`: none does.
     pub rotation: Option<HandleAxis>,
+}
+
+impl Handle {
+    /// As the force law has it with this position scale.
+    pub fn scaled(self, scale: f64) -> Self {
+        Self {
+            translation: self.translation.scaled(scale),
+            ..self
+        }
+    }
 }
 
 /// The loop of a rig whose motors act so many ticks late.

@@ -93,13 +93,15 @@ impl Plane {
 pub struct Limits {
     /// Which rig's, as part of a sentence.
     pub name: String,
+    /// Position scale through which the force law has the handle.
+    pub scale: f64,
     /// The motions that its motors drive.
     pub planes: Vec<Plane>,
 }
 
 impl Limits {
-    /// Computes the limits; `None` if no posture of a description can be driven.
-    pub fn new(subject: &Subject) -> Option<Self> {
+    /// Computes the limits with a position scale; `None` if no posture of a description can be driven.
+    pub fn new(subject: &Subject, scale: f64) -> Option<Self> {
         let handle = match subject {
             Subject::Simulated => simulated(),
             Subject::Described { rig, real } => described(rig, *real)?,
@@ -108,7 +110,7 @@ impl Limits {
             name,
             translation,
             rotation,
-        } = handle;
+        } = handle.scaled(scale);
         let plane = |(motion, handle): (Motion, HandleAxis)| Plane {
             motion,
             handle,
@@ -118,6 +120,7 @@ impl Limits {
         let driven = Motion::ALL.into_iter().zip(moved);
         Some(Self {
             name,
+            scale,
             planes: driven
                 .filter_map(|(motion, handle)| Some(plane((motion, handle?))))
                 .collect(),
@@ -125,21 +128,21 @@ impl Limits {
     }
 }
 
-/// The limits computed last, kept while the rig is the same: they are drawn many times a second.
+/// The limits computed last, kept while rig and position scale are the same: they are drawn many times a second.
 #[derive(Default)]
-pub struct Kept(RefCell<Option<(Subject, Option<Arc<Limits>>)>>);
+pub struct Kept(RefCell<Option<(Subject, f64, Option<Arc<Limits>>)>>);
 
 impl Kept {
-    /// The limits of a rig.
-    pub fn of(&self, subject: &Subject) -> Option<Arc<Limits>> {
+    /// The limits of a rig with a position scale.
+    pub fn of(&self, subject: &Subject, scale: f64) -> Option<Arc<Limits>> {
         let mut kept = self.0.borrow_mut();
-        if let Some((known, limits)) = &*kept
-            && known == subject
+        if let Some((known, known_scale, limits)) = &*kept
+            && (known, *known_scale) == (subject, scale)
         {
             return limits.clone();
         }
-        let limits = Limits::new(subject).map(Arc::new);
-        *kept = Some((subject.clone(), limits.clone()));
+        let limits = Limits::new(subject, scale).map(Arc::new);
+        *kept = Some((subject.clone(), scale, limits.clone()));
         limits
     }
 }

@@ -120,6 +120,17 @@ pub fn basis(plane: &Plane) -> String {
     )
 }
 
+/// What a position scale does to the limits; `None` where it does nothing.
+pub fn scaled(scale: f64) -> Option<String> {
+    (scale != 1.0).then(|| {
+        format!(
+            "Seen through a position scale of {}: its weight and friction are felt at the part over {}",
+            number(scale),
+            number(scale * scale)
+        )
+    })
+}
+
 /// What the limits hold for.
 pub fn class() -> String {
     format!(
@@ -141,7 +152,7 @@ mod tests {
 
     #[test]
     fn the_simulated_handle_trembles_before_it_oscillates() {
-        let limits = Limits::new(&Subject::Simulated).expect("limits");
+        let limits = Limits::new(&Subject::Simulated, 1.0).expect("limits");
         let [translation, rotation] = &limits.planes[..] else {
             panic!("two motions")
         };
@@ -171,7 +182,7 @@ mod tests {
             rig: Box::new(rig),
             real: true,
         };
-        let limits = Limits::new(&subject).expect("limits");
+        let limits = Limits::new(&subject, 1.0).expect("limits");
         let [plane] = &limits.planes[..] else {
             panic!("no torque")
         };
