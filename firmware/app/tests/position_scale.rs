@@ -48,7 +48,7 @@ fn tick(bench: &mut Bench, position: Vec3, velocity: Vec3, turn: f32) -> (Wrench
     }
 }
 
-/// A hand that swings, mm and rad, at tick `k`.
+/// A hand that swings, m, m/s and rad, at tick `k`.
 fn hand(k: u32, swing: Vec3) -> (Vec3, Vec3, f32) {
     let phase = 0.03 * k as f32;
     let position = swing * (1.0 - phase.cos());

@@ -1,7 +1,8 @@
 //! The renderer's picture within the window, pixel for pixel.
 //!
 //! Not by the window library's own shader: it filters a texture in two ways and chooses between them, and a software renderer computes both in every
-//! pixel. With this, and panels that fill nothing, a window of 1280 × 800 pixels takes 23 ms a frame on two cores instead of 82 ms.
+//! pixel. With this, and panels that fill nothing, a window of 1280 × 800 pixels takes 23 ms a frame on two cores instead of 82 ms
+//! (`docs/notes/2026-11-29-frames-without-a-graphics-card.md`).
 
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait};
 use eframe::wgpu;

@@ -6,8 +6,9 @@ use mortise::session::{Intent, Session};
 use mortise::ui::Window;
 use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
+use mortise_record::{Recording, replay};
 
-use crate::common::{arm, click, connect, harness, open_sample, poses, texts, until, worst};
+use crate::common::{arm, begin_recording, click, connect, harness, open_sample, poses, texts, until, worst};
 
 fn scale(harness: &mut Harness<'_, Window>, value: f32) {
     let set = Intent::SetParameter(ParameterId::PositionScale, value);
@@ -23,7 +24,9 @@ fn grab(harness: &mut Harness<'_, Window>) {
 
 #[test]
 fn a_part_moves_so_many_times_as_far_as_the_handle_and_the_window_says_how_stiff_that_feels() {
+    let data = tempfile::tempdir().expect("a folder");
     let mut harness = harness();
+    harness.state_mut().session.recordings = Some(data.path().join("recordings"));
     open_sample(&mut harness);
     connect(&mut harness);
     assert!(texts(&harness, "The part moves").is_empty(), "nothing is scaled");
@@ -37,6 +40,7 @@ fn a_part_moves_so_many_times_as_far_as_the_handle_and_the_window_says_how_stiff
         texts(&harness, "Stiffness may rise by 3.14 times").is_empty(),
         "the margin is that of the scaled handle"
     );
+    let path = begin_recording(&mut harness);
     arm(&mut harness);
     click(&mut harness, "peg");
     grab(&mut harness);
@@ -75,4 +79,11 @@ fn a_part_moves_so_many_times_as_far_as_the_handle_and_the_window_says_how_stiff
     });
     grab(&mut harness);
     assert_eq!(texts(&harness, "The part moves 2 times").len(), 1);
+
+    harness.state_mut().session.act(Intent::EndRecording);
+    until(&mut harness, "the recording ends", |s| s.recording.is_none());
+    let recording = Recording::open(&path).expect("a recording");
+    let replayed = replay(&recording, &[]).expect("it can be replayed");
+    assert_eq!(replayed.difference, None, "{replayed:?}");
+    assert!(replayed.compared > 1000, "{replayed:?}");
 }
