@@ -200,6 +200,7 @@ fn area(part: usize, section: &Section, plane: &CutPlane) -> Area {
             vertices,
             indices,
             segments,
+            closed: false,
         },
         open_lines: section.open.len(),
         area_mm2: section.area_mm2(),

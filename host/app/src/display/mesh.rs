@@ -44,6 +44,8 @@ pub struct ShapeMesh {
     pub indices: Vec<u32>,
     /// Edges.
     pub segments: Vec<Segment>,
+    /// Whether the triangles enclose a volume and wind outward: then no back of one is seen from outside.
+    pub closed: bool,
 }
 
 impl ShapeMesh {
@@ -89,6 +91,7 @@ impl ShapeMesh {
                 faces,
             }));
         }
+        mesh.closed = shape.closed && mesh.indices.len() == 3 * shape.mesh.triangles.len();
         mesh
     }
 }

@@ -17,8 +17,10 @@ pub const SAMPLES: u32 = 4;
 pub struct Pipelines {
     /// Background.
     pub sky: wgpu::RenderPipeline,
-    /// Opaque parts.
+    /// Opaque parts, both sides of their faces.
     pub solid: wgpu::RenderPipeline,
+    /// Closed opaque parts: the outer side of their faces alone, which costs half as much.
+    pub outside: wgpu::RenderPipeline,
     /// Areas of a section.
     pub area: wgpu::RenderPipeline,
     /// Transparent parts: blended, without hiding what is behind them.
@@ -68,6 +70,17 @@ impl Pipelines {
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32x2],
         })];
         let make = |kind: Kind<'_>| pipeline(device, &module, &layout, &kind);
+        let solid_parts = |cull| {
+            make(Kind {
+                label: "solid",
+                vertex: "solid_vertex",
+                fragment: "solid_fragment",
+                buffers: &solid,
+                cull,
+                write_depth: true,
+                compare: wgpu::CompareFunction::Less,
+            })
+        };
         let glow = |fragment, compare| {
             make(Kind {
                 label: "glow",
@@ -89,15 +102,8 @@ impl Pipelines {
                 write_depth: false,
                 compare: wgpu::CompareFunction::Always,
             }),
-            solid: make(Kind {
-                label: "solid",
-                vertex: "solid_vertex",
-                fragment: "solid_fragment",
-                buffers: &solid,
-                cull: None,
-                write_depth: true,
-                compare: wgpu::CompareFunction::Less,
-            }),
+            solid: solid_parts(None),
+            outside: solid_parts(Some(wgpu::Face::Back)),
             area: make(Kind {
                 label: "area",
                 vertex: "solid_vertex",

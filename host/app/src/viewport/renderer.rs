@@ -63,6 +63,7 @@ struct Loaded {
     index_count: u32,
     segments: wgpu::Buffer,
     segment_count: u32,
+    closed: bool,
 }
 
 struct Targets {
@@ -208,7 +209,14 @@ impl Renderer {
             for item in &solid {
                 let shape = &self.shapes[item.shape];
                 self.select(&mut pass, at);
-                solid_of(&mut pass, &self.pipelines.solid, shape);
+                // A section shows the inside, too.
+                let outside = shape.closed && picture.cut.is_none();
+                let pipeline = if outside {
+                    &self.pipelines.outside
+                } else {
+                    &self.pipelines.solid
+                };
+                solid_of(&mut pass, pipeline, shape);
                 lines_of(&mut pass, &self.pipelines.lines, shape, item.line);
                 at += 1;
             }
@@ -411,6 +419,7 @@ fn load(device: &wgpu::Device, mesh: &ShapeMesh) -> Loaded {
             wgpu::BufferUsages::VERTEX,
         ),
         segment_count: mesh.segments.len() as u32,
+        closed: mesh.closed,
     }
 }
 

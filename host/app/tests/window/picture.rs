@@ -345,6 +345,32 @@ fn cut_drawn(projection: Projection) {
     assert!(front.iter().all(|[r, _, b]| *b > r + 60), "{front:?}");
 }
 
+/// From any side, closed parts look the same whether the backs of their triangles are drawn or not.
+#[test]
+fn the_backs_of_closed_parts_are_not_missed() {
+    let Some((device, queue)) = device() else { return };
+    let document = Document::sample(0, &|_| ControlFlow::Continue(())).expect("the sample");
+    assert!(document.meshes.iter().all(|mesh| mesh.closed));
+    let mut both_sides = document.meshes.to_vec();
+    both_sides.iter_mut().for_each(|mesh| mesh.closed = false);
+    let mut renderer = Renderer::new(&device, &queue);
+    renderer.resize(SIZE);
+    for view in [View::Front, View::Right, View::Top, View::Iso] {
+        let mut camera = Camera::default();
+        camera.look(view);
+        let picture = picture(&document, camera);
+        let drawn = [&document.meshes[..], &both_sides].map(|meshes| {
+            renderer.set_shapes(meshes);
+            renderer.render(&picture);
+            read(&device, &queue, renderer.texture().expect("resized").0)
+        });
+        let [without, with] = &drawn;
+        let differ = without.iter().zip(with).filter(|(a, b)| a != b).count();
+        // At outlines a back may reach a sample that no front covers.
+        assert!(differ < with.len() / 500, "{view:?}: {differ} pixels");
+    }
+}
+
 #[test]
 fn nothing_to_draw_is_no_trouble() {
     let Some((device, queue)) = device() else { return };
