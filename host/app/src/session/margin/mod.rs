@@ -130,19 +130,31 @@ impl Limits {
 
 /// The limits computed last, kept while rig and position scale are the same: they are drawn many times a second.
 #[derive(Default)]
-pub struct Kept(RefCell<Option<(Subject, f64, Option<Arc<Limits>>)>>);
+pub struct Kept(RefCell<Option<Known>>);
+
+/// Limits, and what they are the limits of.
+struct Known {
+    subject: Subject,
+    scale: f64,
+    limits: Option<Arc<Limits>>,
+}
 
 impl Kept {
     /// The limits of a rig with a position scale.
     pub fn of(&self, subject: &Subject, scale: f64) -> Option<Arc<Limits>> {
         let mut kept = self.0.borrow_mut();
-        if let Some((known, known_scale, limits)) = &*kept
-            && (known, *known_scale) == (subject, scale)
+        if let Some(known) = kept
+            .as_ref()
+            .filter(|known| (&known.subject, known.scale) == (subject, scale))
         {
-            return limits.clone();
+            return known.limits.clone();
         }
         let limits = Limits::new(subject, scale).map(Arc::new);
-        *kept = Some((subject.clone(), scale, limits.clone()));
+        *kept = Some(Known {
+            subject: subject.clone(),
+            scale,
+            limits: limits.clone(),
+        });
         limits
     }
 }
