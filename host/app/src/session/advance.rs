@@ -109,10 +109,7 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
         Step::Play => {
             let insertion = session.document.as_ref()?.insertion?;
             let hand = script(&insertion, &session.scaled_handle()?, &Manner::default());
-            let hand = session.for_handle(hand);
-            if let Some(connection) = session.connection_mut() {
-                connection.set_hand(hand);
-            }
+            session.move_hand(hand);
             session.notes.add(
                 Severity::Info,
                 format!(

@@ -124,7 +124,7 @@ pub fn basis(plane: &Plane) -> String {
 pub fn scaled(scale: f64) -> Option<String> {
     (scale != 1.0).then(|| {
         format!(
-            "Seen through a position scale of {}: its weight and friction are felt at the part over {}",
+            "Seen through a position scale of {}: at the part it has its inertia and friction divided by {}",
             number(scale),
             number(scale * scale)
         )
