@@ -84,7 +84,7 @@ const HALF: usize = MAX_CONTACTS / 2;
 /// offered stay. A contact is filled in place: it is too large to pass by value in the innermost loop.
 #[derive(Clone, Debug)]
 pub(crate) struct Contacts {
-    /// Contacts of this tick and the last one, alternating, filled up to their lengths. After an overflow the first half holds the deepest.
+    /// Contacts of this tick and the last one, alternating, filled up to their lengths.
     lists: [[Contact; MAX_CONTACTS]; 2],
     /// Index of this tick's list: 0 or 1.
     current: usize,
@@ -126,12 +126,12 @@ impl Heap {
         }
     }
 
-    /// Builds the heap over the `keys` of one half, in the list's order.
+    /// Builds the heap over the contacts at `places`, by the `key` of each.
     #[cold]
-    fn build(&mut self, keys: impl Iterator<Item = f32>) {
-        for (i, key) in keys.enumerate().take(HALF) {
-            self.keys[i] = key;
-            self.places[i] = i as u8;
+    fn build(&mut self, places: &[u8], key: impl Fn(u8) -> f32) {
+        for (i, &place) in places.iter().enumerate().take(HALF) {
+            self.keys[i] = key(place);
+            self.places[i] = place;
         }
         for i in (0..HALF / 2).rev() {
             self.sift_down(i);
@@ -219,18 +219,21 @@ impl Contacts {
     pub fn carry(&mut self, motion: &[f32; 6], unvisited: impl Fn(NodeCursor) -> bool) -> u32 {
         let mut carried = 0;
         for i in 0..self.carried_len {
-            let old = self.lists[1 - self.current][i];
+            let old = &self.lists[1 - self.current][i];
+            if old.phase == Phase::Free || !unvisited(old.leaf) {
+                continue;
+            }
             let gap = old.gap + dot(&old.row, motion);
-            if old.phase != Phase::Free
-                && unvisited(old.leaf)
-                && let Some(new) = self.offer(gap, old.reach_gap, old.arm.length_squared())
-            {
-                *new = Contact {
-                    gap,
-                    rate: 0.0,
-                    phase: Phase::Free,
-                    ..old
+            let (reach_gap, arm2) = (old.reach_gap, old.arm.length_squared());
+            if let Some(place) = self.place(gap, reach_gap, arm2) {
+                let [first, second] = &mut self.lists;
+                let (new, old) = if self.current == 0 {
+                    (first, second)
+                } else {
+                    (second, first)
                 };
+                new[place] = old[i];
+                (new[place].gap, new[place].rate, new[place].phase) = (gap, 0.0, Phase::Free);
                 carried += 1;
             }
         }
@@ -281,6 +284,16 @@ impl Contacts {
     /// is two comparisons, and at most twice 7 heap steps when the contact displaces others.
     #[inline]
     pub fn offer(&mut self, gap: f32, reach_gap: f32, arm2: f32) -> Option<&mut Contact> {
+        let place = self.place(gap, reach_gap, arm2)?;
+        let contact = &mut self.lists[self.current][place];
+        contact.gap = gap;
+        contact.reach_gap = reach_gap;
+        Some(contact)
+    }
+
+    /// Index of the slot of [`Self::offer`].
+    #[inline]
+    fn place(&mut self, gap: f32, reach_gap: f32, arm2: f32) -> Option<usize> {
         let place = if self.len < MAX_CONTACTS {
             self.len += 1;
             self.len - 1
@@ -290,10 +303,7 @@ impl Contacts {
         if arm2 > self.farthest2 {
             self.farthest2 = arm2;
         }
-        let contact = &mut self.lists[self.current][place];
-        contact.gap = gap;
-        contact.reach_gap = reach_gap;
-        Some(contact)
+        Some(place)
     }
 
     /// Index for a new contact once the list is full. Out of line: the loop over points is faster for it.
@@ -302,9 +312,13 @@ impl Contacts {
         let list = &mut self.lists[self.current];
         if !self.dropped {
             self.dropped = true;
-            list.select_nth_unstable_by(HALF, |a, b| a.gap.total_cmp(&b.gap));
-            self.by_gap.build(list[..HALF].iter().map(|c| c.gap));
-            self.by_reach.build(list[HALF..].iter().map(|c| c.reach_gap));
+            // Places are put in order, which are a byte each, and contacts stay where they are.
+            let mut places: [u8; MAX_CONTACTS] = core::array::from_fn(|place| place as u8);
+            let of = |place: u8| &list[usize::from(place)];
+            places.select_nth_unstable_by(HALF, |a, b| of(*a).gap.total_cmp(&of(*b).gap));
+            let (deepest, rest) = places.split_at(HALF);
+            self.by_gap.build(deepest, |place| of(place).gap);
+            self.by_reach.build(rest, |place| of(place).reach_gap);
         }
         if gap >= self.by_gap.largest() {
             return self.displace_in_second_half(gap, reach_gap);
@@ -320,7 +334,7 @@ impl Contacts {
     /// Index in the second half, unless all contacts there would touch sooner. Counts the dropped contact if it touches.
     fn displace_in_second_half(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
         let sooner = reach_gap < self.by_reach.largest();
-        let place = sooner.then(|| HALF + self.by_reach.replace_largest(reach_gap));
+        let place = sooner.then(|| self.by_reach.replace_largest(reach_gap));
         let left_out = place.map_or(gap, |place| self.lists[self.current][place].gap);
         self.lost += u32::from(left_out < 0.0);
         place

@@ -59,6 +59,8 @@ costs! {
     ALLOWANCE = 190;
     /// Extra cost of a candidate, a point that may touch: 180, and 37 a solve; half of them do, and in most ticks two solves are enough.
     CANDIDATE = 180 + 2 * 37;
+    /// Extra cost of a contact that pushed in the last tick, whether it is found again or carried over, with two solves.
+    PUSHING = 480 + 2 * 40;
     /// Extra cost of a candidate in each solve past the third.
     CANDIDATE_IN_SOLVE = 71;
     /// Transforms and data of a pair of parts, in one direction, that is searched.
@@ -77,14 +79,22 @@ costs! {
     NOTED = 24;
     /// Fixed cost of an exclusion query for a leaf, before anything is read.
     EXCLUSION = 760;
-    /// Bound of the distance from a piece of an edge to a node, or to a piece, of the other part's edges.
-    EDGE_BOUND = 48;
+    /// Bound of the distance from the sphere about a piece of an edge to that about a node, or a piece, of the other part's edges.
+    EDGE_BOUND = 26;
+    /// Bound of the distance from a piece of an edge to the sphere about a piece of the other part's edges.
+    PIECE_BOUND = 42;
+    /// Placing a piece of an edge of the held part.
+    PIECE = 95;
     /// Nearest places of two pieces of edges.
-    EDGE_PAIR = 167;
+    EDGE_PAIR = 75;
     /// Circle through a piece of an edge.
-    CIRCLE = 455;
+    CIRCLE = 190;
+    /// Bound of the travel until two circles cross.
+    CIRCLE_PAIR = 67;
     /// Contact of two pieces of edges.
-    CROSSING = 285;
+    CROSSING = 380;
+    /// Fixed cost of a search for the travel until a leaf's edges may touch.
+    EDGE_TRAVEL = 760;
     /// Setting up a target's spring and what depends on it, without its cost in a solve.
     SPRING = 1140;
     /// One solve without springs.
@@ -141,6 +151,7 @@ mod tests {
                 ("MATING", 2),
                 ("ALLOWANCE", 8),
                 ("CANDIDATE", 11),
+                ("PUSHING", 24),
                 ("CANDIDATE_IN_SOLVE", 3),
                 ("PAIR", 34),
                 ("LEAF", 6),
@@ -150,10 +161,14 @@ mod tests {
                 ("FIND_FACE", 32),
                 ("NOTED", 1),
                 ("EXCLUSION", 32),
-                ("EDGE_BOUND", 2),
-                ("EDGE_PAIR", 7),
-                ("CIRCLE", 19),
-                ("CROSSING", 12),
+                ("EDGE_BOUND", 1),
+                ("PIECE_BOUND", 2),
+                ("PIECE", 4),
+                ("EDGE_PAIR", 3),
+                ("CIRCLE", 8),
+                ("CIRCLE_PAIR", 3),
+                ("CROSSING", 16),
+                ("EDGE_TRAVEL", 32),
                 ("SPRING", 48),
                 ("SOLVE", 64),
                 ("SPRING_IN_SOLVE", 20),

@@ -14,7 +14,10 @@ use mortise_protocol::image::{EDGE_ERROR_CELLS, EdgeRecord, NodeRecord};
 
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
-use crate::collision::cost::{CIRCLE, CROSSING, EDGE_BOUND, EDGE_PAIR, LOOKUP, MATING, NODE, PASSED_OVER};
+use crate::collision::cost::{
+    CIRCLE, CIRCLE_PAIR, CROSSING, EDGE_BOUND, EDGE_PAIR, EDGE_TRAVEL, LOOKUP, MATING, NODE, PASSED_OVER,
+    PIECE, PIECE_BOUND,
+};
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::edge_crossing::{Circle, Crossing, Piece, are_within, crossing, nearest, run_along};
 use crate::collision::node_cursor::NodeCursor;
@@ -199,6 +202,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let reserve = self.search.margin + DEEPEST_M + RESERVE_M + RESERVE_TICKS * self.search.way;
         let mut near = Near::new();
         let mut least = reserve;
+        self.spent += EDGE_TRAVEL;
         self.near_edges(pair, node, reserve, |search, other| {
             let _ = near.push(other);
             if near.is_full() {
@@ -259,9 +263,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
-            self.spent += EDGE_BOUND * near.len() as u32;
+            self.spent += PIECE + EDGE_BOUND * near.len() as u32;
             for other in near {
-                if !other.is_within(center, radius, reach) || !own.is_near(other.sphere(), reach) {
+                if !other.is_within(center, radius, reach) || !self.is_near(&own, other, reach) {
                     continue;
                 }
                 self.spent += EDGE_PAIR;
@@ -277,6 +281,13 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
         }
         any_near
+    }
+
+    /// Whether a piece is at most `reach` (m) apart from the sphere about another one.
+    #[inline]
+    fn is_near(&mut self, own: &Piece<'_>, other: &Piece<'_>, reach: f32) -> bool {
+        self.spent += PIECE_BOUND;
+        own.is_near(other.sphere(), reach)
     }
 
     /// The circle through a piece, which is kept in `known`; `None` for a straight one.
@@ -312,12 +323,12 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
             let mut circle = None;
-            self.spent += EDGE_BOUND * near.len() as u32;
+            self.spent += PIECE + EDGE_BOUND * near.len() as u32;
             for (other, other_circle) in near.iter().zip(&mut circles) {
-                if !other.is_within(center, radius, least) || !own.is_near(other.sphere(), least) {
+                if !other.is_within(center, radius, least) || !self.is_near(&own, other, least) {
                     continue;
                 }
-                self.spent += EDGE_BOUND;
+                self.spent += CIRCLE_PAIR;
                 let travel = (self.circle(&mut circle, &own))
                     .and_then(|own| Some(own.travel(self.circle(other_circle, other)?, turn)));
                 let along = travel.map_or(0.0, |travel| DEEPEST_M + travel);

@@ -23,7 +23,7 @@ use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
-    ALLOWANCE, CANDIDATE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, Used,
+    ALLOWANCE, CANDIDATE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, PUSHING, Used,
 };
 use crate::collision::decimation::mask;
 use crate::collision::directed_pair::DirectedPair;
@@ -121,7 +121,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         let stop = traversal
             .pairs(start, None)
             .or_else(|| traversal.pairs(NodeCursor::FIRST, Some(start)));
-        let (spent, expected, point_work) = (traversal.spent, traversal.expected, traversal.point_work);
+        let (spent, not_found, point_work) = (traversal.spent, traversal.expected, traversal.point_work);
         let mut carried = 0;
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET);
@@ -134,9 +134,10 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
                 !visited
             });
         }
+        let found = self.expected() - not_found;
         let used = Used {
-            all: (spent + CANDIDATE * carried - CANDIDATE * expected) / LOOKUP,
-            point_work: point_work / LOOKUP,
+            all: (spent + PUSHING * carried - PUSHING * not_found) / LOOKUP,
+            point_work: (point_work + PUSHING * (found + carried)) / LOOKUP,
         };
         (stop, used)
     }
@@ -175,6 +176,14 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         Some(pair)
     }
 
+    /// Contacts paid for before the search. A quarter of the budget at least is left, so that every leaf's turn comes.
+    fn expected(&self) -> u32 {
+        let most = LOOKUP
+            .saturating_mul(self.budget / 4 * 3)
+            .saturating_sub(LOOKUP * self.reserved);
+        self.carried.min(most / PUSHING)
+    }
+
     /// A traversal that has not begun, with an empty contact store; with `keep_previous` the previous contacts can be carried over.
     pub fn traverse<'w>(
         &'w self,
@@ -184,18 +193,14 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         work: &'w mut Work,
     ) -> Traversal<'w, 'w, 'i, R> {
         contacts.begin(keep_previous);
-        // A quarter of the budget at least is left, so that every leaf's turn comes.
-        let most = LOOKUP
-            .saturating_mul(self.budget / 4 * 3)
-            .saturating_sub(LOOKUP * self.reserved);
-        let expected = self.carried.min(most / CANDIDATE);
+        let expected = self.expected();
         Traversal {
             search: self,
             horizon: coherence.horizon(self.margin),
             coherence,
             contacts,
             work,
-            spent: LOOKUP * self.reserved + CANDIDATE * expected,
+            spent: LOOKUP * self.reserved + PUSHING * expected,
             expected,
             point_work: 0,
             decimation_work: 0,
