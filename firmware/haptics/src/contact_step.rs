@@ -1,5 +1,6 @@
 //! The step with all contacts within reach: search for contacts, solution, and the results that the next tick needs from both.
 
+use glam::Vec3;
 use mortise_protocol::image::SceneImage;
 
 use crate::baseline::explicit;
@@ -148,6 +149,9 @@ fn search(
         shrunk_m,
         pose: grabbed.pose(),
         center: grabbed.center,
+        middle: grabbed
+            .pose()
+            .transform_point(Vec3::from_array(held_shape.record.center)),
         margin: reach.margin,
         way: settings.period_s * point_speed(grabbed.twist, grabbed.body.reach),
         slack: given.slack(),

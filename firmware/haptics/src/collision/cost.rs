@@ -50,7 +50,7 @@ costs! {
     /// Distance to one of several surfaces that a cell names.
     SURFACE = 124;
     /// Extra cost of a span of an edge: its parabola, and whether it may touch.
-    SPAN = 430;
+    SPAN = 545;
     /// Extra cost of a point within the margin.
     NEAR = 135;
     /// Extra cost at guided parts: query for the faces' mating.
@@ -64,7 +64,7 @@ costs! {
     /// Extra cost of a candidate in each solve past the third.
     CANDIDATE_IN_SOLVE = 71;
     /// Transforms and data of a pair of parts, in one direction, that is searched.
-    PAIR = 800;
+    PAIR = 600;
     /// Fixed cost of a leaf.
     LEAF = 148;
     /// Field query of a node.
@@ -79,8 +79,10 @@ costs! {
     NOTED = 24;
     /// Fixed cost of an exclusion query for a leaf, before anything is read.
     EXCLUSION = 760;
-    /// Bound of the distance from the sphere about a piece of an edge to that about a node, or a piece, of the other part's edges.
-    EDGE_BOUND = 26;
+    /// Bound of the distance from a leaf's sphere to that about a node of the other part's edges.
+    EDGE_NODE = 24;
+    /// Bound of the distance from the sphere about a piece of an edge, or about a leaf of them, to that about a piece of the other part's edges.
+    EDGE_BOUND = 36;
     /// Bound of the distance from a piece of an edge to the sphere about a piece of the other part's edges.
     PIECE_BOUND = 42;
     /// Placing a piece of an edge of the held part.
@@ -146,14 +148,14 @@ mod tests {
             counted.eq([
                 ("LOOKUP", 8),
                 ("SURFACE", 5),
-                ("SPAN", 18),
+                ("SPAN", 23),
                 ("NEAR", 6),
                 ("MATING", 2),
                 ("ALLOWANCE", 8),
                 ("CANDIDATE", 11),
                 ("PUSHING", 24),
                 ("CANDIDATE_IN_SOLVE", 3),
-                ("PAIR", 34),
+                ("PAIR", 25),
                 ("LEAF", 6),
                 ("NODE", 12),
                 ("PASSED_OVER", 5),
@@ -161,7 +163,8 @@ mod tests {
                 ("FIND_FACE", 32),
                 ("NOTED", 1),
                 ("EXCLUSION", 32),
-                ("EDGE_BOUND", 1),
+                ("EDGE_NODE", 1),
+                ("EDGE_BOUND", 2),
                 ("PIECE_BOUND", 2),
                 ("PIECE", 4),
                 ("EDGE_PAIR", 3),

@@ -2,10 +2,10 @@
 //!
 //! When the budget runs out, contacts that pushed in leaves not reached are carried over, and the next tick resumes where this one stopped. That
 //! suffices where two ticks complete a round, and for the first pass over everything after a grab. Where they do not, every second near point is
-//! decimated, then every second of the rest, until two ticks suffice. Whole leaves are decimated only where points are most of the work even at an
-//! eighth of them: a face may have no more than one leaf. Otherwise the ticks continue to complete rounds as they can. The level falls again,
-//! doubling the points each time, once the budget would allow it and nothing was carried over for a quarter of a second: contacts that come and go
-//! are felt more than fewer of them.
+//! decimated, then, a round later, every second of the rest, until two ticks suffice. Whole leaves are decimated only where points are most of the
+//! work even at an eighth of them: a face may have no more than one leaf. Otherwise the ticks continue to complete rounds as they can. Contacts
+//! count as points, those carried over, too. The level falls again, doubling the points each time, once that would not make it rise, for a quarter
+//! of a second: contacts that come and go are felt more than fewer of them.
 
 use crate::collision::contact::MAX_CONTACTS;
 use crate::collision::cost::Used;
@@ -15,11 +15,11 @@ use crate::collision::node_key::{ALL, Points};
 /// Consecutive ticks whose budget may run out before the last leaf is reached: beyond them, that is, where near points are not queried every second
 /// tick, points are decimated.
 const MAX_OVERRUNS: u8 = 1;
-/// The same limit after a grab, until everything was searched for the first time.
+/// The same limit after a grab, and after a rise of the level, until everything was searched once.
 const MAX_FIRST_OVERRUNS: u8 = 64;
 /// Highest level: each 128th near point is always queried.
 const MAX_DECIMATION: u8 = 7;
-/// Consecutive ticks whose budget must suffice before the level falls.
+/// Consecutive ticks whose budget must suffice, or hardly be spent on points, before the level falls.
 const CALM_TICKS: u16 = 250;
 /// Twice the points fit a budget or store when they are expected to fill less than eight ninths of it.
 const NINTHS: u32 = 8;
@@ -47,7 +47,7 @@ pub(crate) struct Decimation {
     level: u8,
     /// Ticks whose budget may still run out before the level rises.
     patience: u8,
-    /// Consecutive ticks whose budget sufficed, counted anew from each fall of the level.
+    /// Consecutive ticks in which twice the points would not have raised the level, counted anew from each fall of the level.
     calm: u16,
 }
 
@@ -84,10 +84,14 @@ impl Decimation {
     pub fn update(&mut self, searched: &Searched) {
         let overrun = self.count_overrun(searched);
         let Searched { touching, lost, .. } = *searched;
+        let calm =
+            searched.stopped.is_none() || !self.helps_with(2 * searched.used.point_work, searched.budget);
+        self.calm = if calm { self.calm.saturating_add(1) } else { 0 };
         if lost > 0 {
             self.decimate_to_fit(touching + lost);
         } else if overrun && self.level < MAX_DECIMATION && self.helps(searched) {
             self.level += 1;
+            self.patience = MAX_FIRST_OVERRUNS;
         } else if self.level > 0 && self.calm >= CALM_TICKS && has_capacity(searched) {
             self.level -= 1;
             self.calm = 0;
@@ -98,10 +102,8 @@ impl Decimation {
     fn count_overrun(&mut self, searched: &Searched) -> bool {
         let Some(stop) = searched.stopped else {
             self.patience = MAX_OVERRUNS;
-            self.calm = self.calm.saturating_add(1);
             return false;
         };
-        self.calm = 0;
         if stop < searched.start {
             // Past the last leaf and on from the first: the first pass is complete, too.
             self.patience = MAX_OVERRUNS;
@@ -115,8 +117,13 @@ impl Decimation {
     /// Whether half the points would reduce the work noticeably, because points rather than the traversal dominate it. Where whole leaves would be
     /// decimated, points must dominate so far that there are enough leaves for every face to keep some.
     fn helps(&self, searched: &Searched) -> bool {
+        self.helps_with(searched.used.point_work, searched.budget)
+    }
+
+    /// As [`Self::helps`], with this work on points.
+    fn helps_with(&self, point_work: u32, budget: u32) -> bool {
         let part = if self.level < LEAF_DECIMATION { 4 } else { 2 };
-        part * searched.used.point_work > searched.budget
+        part * point_work > budget
     }
 
     /// Raises the level until `touching` points, counted at the present level, fill at most three quarters of the store.
@@ -132,11 +139,13 @@ impl Decimation {
     }
 }
 
-/// Whether twice the points would fit. The traversal to them costs the same as before.
+/// Whether twice the points would fit. The traversal to them costs the same as before. Where it exceeds the budget by itself, they do if they would
+/// not be decimated for it.
 fn has_capacity(searched: &Searched) -> bool {
     let has_capacity = |filled: u32, of: u32| 9 * filled < NINTHS * of;
     let twice = searched.used.all + searched.used.point_work;
-    has_capacity(twice, searched.budget) && has_capacity(2 * searched.touching, MAX_CONTACTS as u32)
+    let fits = searched.stopped.is_some() || has_capacity(twice, searched.budget);
+    fits && has_capacity(2 * searched.touching, MAX_CONTACTS as u32)
 }
 
 #[cfg(test)]
@@ -238,6 +247,50 @@ mod tests {
             o.update(&sufficed(400));
         }
         assert_eq!(o.level(), 1);
+    }
+
+    /// What a rise of the level brought is known when a round has passed, not before.
+    #[test]
+    fn the_level_rises_once_a_round() {
+        let mut o = Decimation::NEW;
+        o.update(&stopped(500, 5));
+        for round in 0..4 {
+            for tick in 0..10 {
+                o.update(&stopped(5 + 10 * tick, 15 + 10 * tick));
+            }
+            o.update(&stopped(105, 5));
+            assert_eq!(o.level(), round + 1);
+        }
+    }
+
+    /// Once the traversal alone spends the budget, decimated points come back.
+    #[test]
+    fn comes_back_where_points_are_not_what_spends_the_budget() {
+        let mut o = Decimation::NEW;
+        for tick in 0..1000 {
+            o.update(&if tick % 3 == 0 {
+                stopped(40, 5)
+            } else {
+                stopped(5, 40)
+            });
+        }
+        assert_eq!(o.level(), MAX_DECIMATION);
+        let spent_on_points = |point_work| {
+            let used = Used { all: 550, point_work };
+            Searched {
+                used,
+                ..stopped(5, 40)
+            }
+        };
+        // Twice that would be most of the work.
+        for _ in 0..10 * CALM_TICKS {
+            o.update(&spent_on_points(126));
+        }
+        assert_eq!(o.level(), MAX_DECIMATION);
+        for _ in 0..10 * CALM_TICKS {
+            o.update(&spent_on_points(62));
+        }
+        assert_eq!(o.level(), 0);
     }
 
     proptest! {

@@ -15,8 +15,8 @@ use mortise_protocol::image::{EDGE_ERROR_CELLS, EdgeRecord, NodeRecord};
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
 use crate::collision::cost::{
-    CIRCLE, CIRCLE_PAIR, CROSSING, EDGE_BOUND, EDGE_PAIR, EDGE_TRAVEL, LOOKUP, MATING, NODE, PASSED_OVER,
-    PIECE, PIECE_BOUND,
+    CIRCLE, CIRCLE_PAIR, CROSSING, EDGE_BOUND, EDGE_NODE, EDGE_PAIR, EDGE_TRAVEL, LOOKUP, MATING, NODE,
+    PASSED_OVER, PIECE, PIECE_BOUND,
 };
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::edge_crossing::{Circle, Crossing, Piece, are_within, crossing, nearest, run_along};
@@ -226,7 +226,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let tree = pair.field_edges;
         let mut index = 0;
         while let Some(node) = tree.nodes.get(index as usize) {
-            self.spent += EDGE_BOUND;
+            self.spent += EDGE_NODE;
             let farthest = radius + node.radius + reach;
             if (Vec3::from_array(node.center) - center).length_squared() > farthest * farthest {
                 index = node.skip;

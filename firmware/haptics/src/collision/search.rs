@@ -60,6 +60,8 @@ pub(crate) struct Search<'s, 'i, R> {
     pub pose: Pose,
     /// World position of its centre of mass, m.
     pub center: Vec3,
+    /// World position of the centre of its bounding sphere, m.
+    pub middle: Vec3,
     /// Upper bound of any point's travel in this tick: points with larger gaps are not evaluated further, m.
     pub margin: f32,
     /// Upper bound of any point's travel in the last tick, m.
@@ -151,8 +153,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             return false;
         };
         let apart = held.radius + other.radius + self.margin + self.shrunk_m;
-        let held_center = self.pose.transform_point(held.local_center);
-        part != self.held && (held_center - other.center).length_squared() <= apart * apart
+        part != self.held && (self.middle - other.center).length_squared() <= apart * apart
     }
 
     /// Directed pair `index`; `None` where the scene has no such part.

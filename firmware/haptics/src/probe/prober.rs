@@ -147,6 +147,7 @@ fn resting_search<'s, 'i>(
         shrunk_m,
         pose,
         center,
+        middle: center,
         margin: 0.0,
         way: 0.0,
         slack: 0.0,
