@@ -5,9 +5,7 @@
 //! Hamming distance is 4 up to 11 kB), and every burst of up to 32 bits. A replaced byte is a burst. A byte lost, doubled or swapped shifts bits,
 //! which no Hamming distance covers; all cases are tried here.
 
-mod common;
-
-use common::{FROM_DEVICE, Random, TO_DEVICE, from_device, to_device};
+use crate::common::{FROM_DEVICE, Random, TO_DEVICE, from_device, to_device};
 use mortise_protocol::frame::{Decoder, FrameError, encode};
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{FromDevice, ToDevice};

@@ -1,8 +1,6 @@
 //! A million damaged frames: no panic, no damaged frame is accepted, and the next frame is read again.
 
-mod common;
-
-use common::{FROM_DEVICE, Random, TO_DEVICE, from_device, to_device};
+use crate::common::{FROM_DEVICE, Random, TO_DEVICE, from_device, to_device};
 use mortise_protocol::frame::{Decoder, FrameError, encode};
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{FromDevice, ToDevice};

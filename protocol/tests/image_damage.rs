@@ -1,9 +1,7 @@
 //! For any bytes, opening an image either refuses them or makes every access in bounds.
 
-mod scene;
-
+use crate::scene::{self, Aligned};
 use mortise_protocol::image::*;
-use scene::Aligned;
 
 /// xorshift64*: the same damage in every run.
 struct Random(u64);

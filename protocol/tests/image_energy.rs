@@ -1,10 +1,8 @@
 //! Geometric energies of an image: the golden bytes read back, and the density between nodes.
 
-mod scene;
-
+use crate::scene::{self, Aligned};
 use mortise_protocol::image::*;
 use proptest::prelude::*;
-use scene::Aligned;
 
 const GOLDEN: &[u8] = include_bytes!("golden/energy.scene");
 

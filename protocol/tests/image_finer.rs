@@ -1,9 +1,7 @@
 //! Finer bricks: the distance in them, and what an image with wrong ones is refused for.
 
-mod scene;
-
+use crate::scene::{self, Aligned};
 use mortise_protocol::image::*;
-use scene::Aligned;
 
 /// The distance to a plane is interpolated exactly, but for rounding: half a unit of the level's samples, in a coarse brick half of 256 units.
 #[test]

@@ -1,9 +1,7 @@
 //! The scene image's layout is frozen: hand-made bytes, stored in `tests/golden`, are read back through the board's query.
 
-mod scene;
-
+use crate::scene::{self, Aligned};
 use mortise_protocol::image::*;
-use scene::Aligned;
 
 const GOLDEN: &[u8] = include_bytes!("golden/tiny.scene");
 const GOLDEN_OCCUPANCY: &[u8] = include_bytes!("golden/occupancy.scene");

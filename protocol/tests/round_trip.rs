@@ -1,8 +1,6 @@
 //! Every message is unchanged after a round trip, and the largest of each kind fits.
 
-mod common;
-
-use common::{FROM_DEVICE, Random, TO_DEVICE, from_device, to_device};
+use crate::common::{FROM_DEVICE, Random, TO_DEVICE, from_device, to_device};
 use mortise_protocol::frame::{Decoder, encode};
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{FromDevice, ToDevice};

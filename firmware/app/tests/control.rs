@@ -1,16 +1,14 @@
 //! The control plane: effect of each fault on the motors and its latency, the ramp, the soft stop, lockstep.
 
-mod support;
-
+use crate::support::flash::TestFlash;
+use crate::support::image::two_parts;
+use crate::support::{Bench, IDENTITY};
 use glam::{Quat, Vec3};
 use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Sensed};
 use mortise_firmware::control::{FADE_TICKS, RAMP_TICKS, SOFT_STOP_TICKS, Ticked};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::*;
 use mortise_protocol::parameter::ParameterId;
-use support::flash::TestFlash;
-use support::image::two_parts;
-use support::{Bench, IDENTITY};
 
 fn active() -> Bench {
     let mut bench = Bench::ready();

@@ -1,14 +1,12 @@
 //! Motors are driven by fresh commands alone, for a scene whose checksum is right, and STOP needs no space in any queue.
 
-mod support;
-
+use crate::support::Bench;
+use crate::support::flash::TestFlash;
+use crate::support::image::two_parts;
 use mortise_firmware::board::Drive;
 use mortise_firmware::store::IMAGE_OFFSET;
 use mortise_protocol::message::*;
 use mortise_protocol::parameter::ParameterId;
-use support::Bench;
-use support::flash::TestFlash;
-use support::image::two_parts;
 
 /// A host that writes and never reads: 200 commands fill the answers, the queue and the line, and STOP behind them acts in the next tick.
 #[test]

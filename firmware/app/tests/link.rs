@@ -1,7 +1,9 @@
 //! The link plane: which messages are accepted when, every refusal, and robustness against any input.
 
-mod support;
-
+use crate::support::Bench;
+use crate::support::flash::{SLOT, TestFlash};
+use crate::support::image::two_parts;
+use crate::support::rigs::arm;
 use mortise_firmware::board::{Drive, RIG_SLOTS};
 use mortise_firmware::store::IMAGE_OFFSET;
 use mortise_protocol::frame::encode;
@@ -11,10 +13,6 @@ use mortise_protocol::message::*;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_protocol::rig::RigFault;
 use proptest::prelude::*;
-use support::Bench;
-use support::flash::{SLOT, TestFlash};
-use support::image::two_parts;
-use support::rigs::arm;
 
 fn hand() -> HandScript {
     HandScript {

@@ -1,12 +1,10 @@
 //! The test of a single motor: its pulse, its ends, and what refuses it.
 
-mod support;
-
+use crate::support::Bench;
+use crate::support::flash::TestFlash;
 use mortise_firmware::board::Drive;
 use mortise_firmware::control::testing::{BACK, PUSH_TICKS, TEST_TICKS, TRAVEL_M};
 use mortise_protocol::message::*;
-use support::Bench;
-use support::flash::TestFlash;
 
 const TEST: ToDevice = ToDevice::TestMotor {
     joint: 1,

@@ -1,11 +1,9 @@
 //! Parts put elsewhere while the motors are off.
 
-mod support;
-
+use crate::support::Bench;
+use crate::support::flash::TestFlash;
 use mortise_protocol::message::*;
 use proptest::prelude::*;
-use support::Bench;
-use support::flash::TestFlash;
 
 fn place(part: u16, position: [f32; 3], orientation: [f32; 4]) -> ToDevice {
     ToDevice::Place {

@@ -1,7 +1,6 @@
 //! Position scaling: the handle moved by p with the scale s is the handle moved by s·p without, felt s times as strongly.
 
-mod support;
-
+use crate::support::Bench;
 use glam::{Quat, Vec3};
 use mortise_firmware::board::Drive;
 use mortise_firmware::control::RAMP_TICKS;
@@ -9,7 +8,6 @@ use mortise_haptics::Wrench;
 use mortise_protocol::message::{FromDevice, ToDevice};
 use mortise_protocol::parameter::ParameterId;
 use proptest::prelude::*;
-use support::Bench;
 
 /// Armed, nothing held, every tick reported.
 fn armed() -> Bench {

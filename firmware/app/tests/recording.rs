@@ -1,10 +1,8 @@
 //! Inputs of every tick for a recording: complete, in order, of this session only; what is lost is counted.
 
-mod support;
-
+use crate::support::Bench;
 use mortise_firmware::channel::RECORDED;
 use mortise_protocol::message::*;
-use support::Bench;
 
 /// Ticks of the inputs received, and those counted as lost.
 fn recorded(bench: &Bench) -> (Vec<u32>, u32) {

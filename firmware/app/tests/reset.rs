@@ -1,7 +1,8 @@
 //! A reset restores the initial state, to the bit.
 
-mod support;
-
+use crate::support::IDENTITY;
+use crate::support::flash::TestFlash;
+use crate::support::image::two_parts;
 use mortise_firmware::board::{Clock, Identity, Outbound};
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::{ControlPlane, Ticked};
@@ -9,9 +10,6 @@ use mortise_firmware::device::start;
 use mortise_protocol::frame::{Stamp, encode_stamped};
 use mortise_protocol::message::*;
 use mortise_simulation::simulated::Simulated;
-use support::IDENTITY;
-use support::flash::TestFlash;
-use support::image::two_parts;
 
 struct NoClock;
 

@@ -1,16 +1,14 @@
 //! The rig's description on its way into flash and back: complete or absent, checked, and reported when damaged.
 
-mod support;
-
+use crate::support::Bench;
+use crate::support::flash::TestFlash;
+use crate::support::image::two_parts;
+use crate::support::rigs::{arm, paddle, pantograph};
 use mortise_firmware::board::{RIG_SLOTS, WRITE_SIZE};
 use mortise_firmware::store::Store;
 use mortise_firmware::store::rig::{Kept, keep, kept};
 use mortise_protocol::message::{FromDevice, Refusal, ToDevice};
 use mortise_protocol::rig::{Rig, RigFault, RigKey};
-use support::Bench;
-use support::flash::TestFlash;
-use support::image::two_parts;
-use support::rigs::{arm, paddle, pantograph};
 
 #[test]
 fn what_is_kept_is_found_again_and_the_newest_counts() {

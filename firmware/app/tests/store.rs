@@ -1,13 +1,11 @@
 //! The scene store loses no data when power fails at any write.
 
-mod support;
-
+use crate::support::flash::{SECTOR, SLOT, TestFlash};
+use crate::support::image::{parts, seal, two_parts};
 use mortise_firmware::board::{Flash, SLOTS, WRITE_SIZE};
 use mortise_firmware::store::{IMAGE_OFFSET, Store, commit_record};
 use mortise_protocol::image::{CRC, ImageError, LAYOUT_VERSION};
 use mortise_protocol::message::Refusal;
-use support::flash::{SECTOR, SLOT, TestFlash};
-use support::image::{parts, seal, two_parts};
 
 fn store_whole(store: &mut Store<'static, TestFlash>, image: &[u8], chunk: usize) -> Result<(), Refusal> {
     store.begin(image.len() as u32, CRC.checksum(image), LAYOUT_VERSION)?;

@@ -5,15 +5,13 @@
 //! one tried in each. A model of a few lines runs beside the store: the scene in use, and the scenes a restart may find. The flash itself checks that
 //! no word is written twice without erasing.
 
-mod support;
-
 use std::collections::{HashSet, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use crate::support::flash::{SECTOR, SLOT, TestFlash};
+use crate::support::image::two_parts;
 use mortise_firmware::store::Store;
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
-use support::flash::{SECTOR, SLOT, TestFlash};
-use support::image::two_parts;
 
 /// Scenes committed one after another.
 const COMMITS: u8 = 2;

@@ -1,14 +1,12 @@
 //! Scenes over the link: interrupted, committed, while motors are live, damaged in flash.
 
-mod support;
-
+use crate::support::Bench;
+use crate::support::flash::TestFlash;
+use crate::support::image::two_parts;
 use mortise_firmware::board::WRITE_SIZE;
 use mortise_firmware::store::IMAGE_OFFSET;
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::message::*;
-use support::Bench;
-use support::flash::TestFlash;
-use support::image::two_parts;
 
 #[test]
 fn an_upload_cut_at_any_chunk_leaves_the_old_scene_after_a_restart() {

@@ -1,13 +1,12 @@
 //! Any input: never a force above its limit, never a non-finite number, never a panic.
 
-mod support;
-
+use crate::support;
 use std::sync::LazyLock;
 
+use crate::support::image::Image;
 use mortise_haptics::{Flags, Input, Integrator, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick};
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
-use support::image::Image;
 
 /// Diametral clearances of [`scene_of`], m.
 const CLEARANCES: [f64; 3] = [20e-6, 0.1e-3, 1e-3];

@@ -1,14 +1,13 @@
 //! Contact exclusions: mating faces that an engaged target keeps apart are not searched, and the result is the same to the bit.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, run};
+use crate::support::solids::{Block, Bolt};
+use crate::support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
 use mortise_haptics::{Output, Quat, Settings, State, Vec3};
 use mortise_protocol::image::{Lookup, Nearby};
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget};
 use proptest::prelude::*;
-use support::hand::{Hand, run};
-use support::solids::{Block, Bolt};
-use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
 
 /// Result of a run with targets, tick by tick.
 struct Run {

@@ -1,7 +1,6 @@
 //! One thousand ticks give the same bits on every machine and at every level of optimisation.
 
-mod support;
-
+use crate::support;
 use mortise_haptics::{Input, Output, Pose, Quat, Settings, State, Twist, Vec3, tick};
 
 /// FNV-1a over the bits of everything a tick returns.

@@ -1,12 +1,10 @@
 //! Explicit integrator: correct where it is stable, bounded where it is not.
 
-mod support;
-
+use crate::support::image::{Image, Writer};
+use crate::support::solids::Block;
+use crate::support::{SLAB, UPRIGHT, box_of};
 use mortise_haptics::{Input, Integrator, Output, Pose, Quat, Settings, State, Twist, Vec3, tick};
 use mortise_protocol::image::SceneImage;
-use support::image::{Image, Writer};
-use support::solids::Block;
-use support::{SLAB, UPRIGHT, box_of};
 
 /// From the box's middle to a corner, m.
 const CORNER_M: f32 = 15e-3;

@@ -1,9 +1,8 @@
 //! Dry friction: the angle at which a part slips, rest below it, energy, and no trace of it when it is off.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, run};
 use mortise_haptics::{Flags, FrictionSettings, Input, Pose, Quat, Settings, State, Twist, Vec3, tick};
-use support::hand::{Hand, run};
 
 fn rough(kinetic: f32, fixed: f32) -> Settings {
     let mut settings = Settings::default();

@@ -1,26 +1,19 @@
 //! Geometric energies: the force is the gradient of the sum over all charges, a free part settles at the least, rounds and changes of the method cause no
 //! step, and without energies of the held part nothing changes.
 
-mod support;
-#[path = "support/trial.rs"]
-#[expect(dead_code, reason = "its random numbers are used")]
-mod trial;
-#[path = "support/well.rs"]
-mod well;
-
+use crate::support::hand::Hand;
+use crate::support::image::Image;
+use crate::support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
+use crate::trial::Random;
+use crate::well::{
+    Frame, HOLE, HOME, LARGE, OPEN, SLACK, SMALL, Well, compose, displacement, energy_settings, fixed,
+    frame_of, in_fixed, moved, pose_of, with,
+};
 use glam::DVec3;
 use mortise_haptics::{
     GuidanceMethod, Input, Output, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick,
 };
 use mortise_protocol::image::SceneImage;
-use support::hand::Hand;
-use support::image::Image;
-use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
-use trial::Random;
-use well::{
-    Frame, HOLE, HOME, LARGE, OPEN, SLACK, SMALL, Well, compose, displacement, energy_settings, fixed,
-    frame_of, in_fixed, moved, pose_of, with,
-};
 
 /// Largest change of the handle's wrench from tick to tick, as with targets.
 const STEP_N: f32 = 0.05;

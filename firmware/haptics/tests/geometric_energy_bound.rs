@@ -3,22 +3,15 @@
 //! The observer stands outside of the law: see [`mortise_haptics::observer`]. What the energy stores was supplied by nobody and counts as generated once
 //! the hand has it.
 
-mod support;
-#[path = "support/trial.rs"]
-#[expect(dead_code, reason = "its sequences are of targets; its hands are used")]
-mod trial;
-#[path = "support/well.rs"]
-mod well;
-
 use std::sync::LazyLock;
 
+use crate::support::image::Image;
+use crate::support::{BLOCK_HALF, PEG_HALF};
+use crate::trial::{COUNT_M, COUNT_RAD, Hold, Operator, Random};
+use crate::well::{Frame, HOLE, HOME, LARGE, OPEN, SMALL, Well, energy_settings, fixed, frame_of, with};
 use glam::{DQuat, DVec3};
 use mortise_haptics::observer::{Observer, Place};
 use mortise_haptics::{Flags, GuidanceMethod, Output, Settings, State, tick};
-use support::image::Image;
-use support::{BLOCK_HALF, PEG_HALF};
-use trial::{COUNT_M, COUNT_RAD, Hold, Operator, Random};
-use well::{Frame, HOLE, HOME, LARGE, OPEN, SMALL, Well, energy_settings, fixed, frame_of, with};
 
 /// Limit on the energy delivered beyond what the operator supplied, J.
 const LIMIT_J: f64 = 10e-6;

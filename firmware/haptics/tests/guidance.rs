@@ -1,12 +1,11 @@
 //! Constraint targets: they hold the axis, yield to a stronger hand, and cause no step in force.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, Seen, run};
+use crate::support::{BLOCK_HALF, CAP_N, PEG_HALF, along, axis_on_axis, straight};
 use mortise_haptics::{Flags, GuidanceMethod, Output, Quat, Settings, State, TargetError, Vec3, Wrench};
 use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
-use support::hand::{Hand, Seen, run};
-use support::{BLOCK_HALF, CAP_N, PEG_HALF, along, axis_on_axis, straight};
 
 const PEG: u16 = 1;
 

@@ -9,22 +9,20 @@
 //!
 //! and its limit is 10 µJ: without a term for the tick, the look-ahead, the encoders or the number of targets.
 
-mod support;
-#[path = "support/trial.rs"]
-mod trial;
-
+use crate::support;
+use crate::trial;
 use std::sync::LazyLock;
 
+use crate::support::hand::Hand;
+use crate::support::image::Image;
+use crate::support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
+use crate::trial::{Bench, Seen, play};
 use glam::{DQuat, DVec3};
 use mortise_haptics::observer::{Observer, Place, Rise};
 use mortise_haptics::{GuidanceMethod, Quat, Settings, State, Vec3, Wrench, tick};
 use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Path, PathTurn};
 use proptest::prelude::*;
-use support::hand::Hand;
-use support::image::Image;
-use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
-use trial::{Bench, Seen, play};
 
 /// Limit on the energy delivered beyond what the operator supplied, J.
 const LIMIT_J: f64 = 10e-6;

@@ -1,9 +1,8 @@
 //! Insertion of a peg into its hole by a hand that is not quite aligned.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, Seen, run};
 use mortise_haptics::{Flags, Quat, Settings, State};
-use support::hand::{Hand, Seen, run};
 
 /// Tilt of the peg in the hand, degrees.
 const TILT_DEG: f32 = 0.5;

@@ -1,9 +1,8 @@
 //! Properties of the force law apart from contact: coupling, grabbing, rest, frames.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, run};
 use mortise_haptics::{Flags, GrabError, Input, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick};
-use support::hand::{Hand, run};
 
 fn moving(position: Vec3, orientation: Quat, linear: Vec3, angular: Vec3) -> Input {
     Input {

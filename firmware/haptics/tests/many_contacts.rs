@@ -1,9 +1,8 @@
 //! Thousands of points in contact at once.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, run};
 use mortise_haptics::{Flags, Settings, State};
-use support::hand::{Hand, run};
 
 /// A face with 2,025 points pressed flat, at rest within `unrest_n` (N, and 100 N s/m times the handle's speed) after a second. Returns the deepest
 /// penetration, the force on the handle, and the outcome.

@@ -1,19 +1,18 @@
 //! Voxmap contact: tangent planes against the closed form, and the voxmap's search against an exhaustive one.
 
-mod support;
-
+use crate::support;
 use std::sync::LazyLock;
 
+use crate::support::hand::{Hand, run};
+use crate::support::image::{Image, Voxmap};
+use crate::support::solids::Solid;
+use crate::support::{
+    BLOCK_HALF, PEG_HALF, SLAB, axis_on_axis, box_of, hole_and_peg_in_voxels, slab_and_box_in_voxels,
+};
 use glam::{DQuat, DVec3};
 use mortise_haptics::{GuidanceMethod, Input, Pose, Prober, Quat, Settings, State, Twist, Vec3, tick};
 use mortise_protocol::image::Voxel;
 use proptest::prelude::*;
-use support::hand::{Hand, run};
-use support::image::{Image, Voxmap};
-use support::solids::Solid;
-use support::{
-    BLOCK_HALF, PEG_HALF, SLAB, axis_on_axis, box_of, hole_and_peg_in_voxels, slab_and_box_in_voxels,
-};
 
 /// Voxels that do not divide the slab: its top lies 0.1 mm over the middle of a voxel.
 const CELL: f64 = 0.6e-3;

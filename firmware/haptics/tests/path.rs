@@ -1,13 +1,12 @@
 //! Targets of kind `Path`: they hold a part of any shape on its way, with its orientation, leave it free along the way, and end where the way ends.
 
-mod support;
-
+use crate::support;
 use core::f64::consts::TAU;
 
+use crate::support::hand::{Hand, run};
+use crate::support::{BLOCK_HALF, CAP_N, PEG_HALF, along, straight};
 use mortise_haptics::{Pose, Quat, Settings, State, Vec3};
 use mortise_protocol::message::{Path, PathTurn};
-use support::hand::{Hand, run};
-use support::{BLOCK_HALF, CAP_N, PEG_HALF, along, straight};
 
 /// The peg 40 mm above the block: only guidance acts.
 const ABOVE: f64 = BLOCK_HALF + PEG_HALF + 40e-3;

@@ -1,9 +1,8 @@
 //! A part pressed against a wall: the hand feels its own force, and the part stays outside.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, run};
 use mortise_haptics::{Settings, State};
-use support::hand::{Hand, run};
 
 /// Force on the handle (N) and deepest penetration (m) when part 1 is pressed in a direction.
 fn pressed(image: &support::image::Image, from: [f64; 3], direction: [f64; 3], force: f64) -> (f64, f64) {

@@ -1,14 +1,12 @@
 //! Probe: the nearest point found by branch and bound is the nearest of all, and the contacts are the overlapping points.
 
-mod support;
-
 use std::sync::LazyLock;
 
+use crate::support::hole_and_peg;
+use crate::support::image::Image;
 use mortise_haptics::{ContactSettings, Pose, ProbeError, Prober, Quat, Settings, Vec3};
 use mortise_protocol::image::{Lookup, SceneImage};
 use proptest::prelude::*;
-use support::hole_and_peg;
-use support::image::Image;
 
 const BLOCK: u16 = 0;
 const PEG: u16 = 1;

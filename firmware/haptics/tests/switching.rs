@@ -9,14 +9,13 @@
 //!
 //! both of the wrench that acted: 6 nJ for 3 N, and as much again each time the force rises and falls.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, run};
+use crate::support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
 use mortise_haptics::observer::Observer;
 use mortise_haptics::{Flags, Settings, State, TargetError, Vec3, Wrench};
 use mortise_protocol::message::{ConstraintTarget, Feature};
 use proptest::prelude::*;
-use support::hand::{Hand, run};
-use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
 
 /// Largest change of the handle's wrench from tick to tick.
 const STEP_N: f32 = 0.05;

@@ -1,11 +1,10 @@
 //! Touching face pairs: the faces that face each other, with both faces of an edge, and the insertion depth.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, run};
+use crate::support::{BLOCK_HALF, PEG_HALF};
 use mortise_haptics::{FacePair, FacePairs, Quat, Settings, State};
 use mortise_protocol::image::NO_FACE;
-use support::hand::{Hand, run};
-use support::{BLOCK_HALF, PEG_HALF};
 
 /// Faces of the peg.
 const SIDE: u16 = 0;

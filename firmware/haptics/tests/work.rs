@@ -2,10 +2,9 @@
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*tick*'` on this test's release binary with one test chosen gives instructions a tick.
 
-mod support;
-
+use crate::support;
+use crate::support::hand::{Hand, Seen, run};
 use mortise_haptics::{Flags, Settings, State};
-use support::hand::{Hand, Seen, run};
 
 const TICKS: u32 = 2000;
 

@@ -1,10 +1,8 @@
 //! Described mechanisms with the operator model: readings are true, they stay finite and passive, stop at their ranges, and exert the commanded
 //! force.
 
-#[path = "../../app/tests/support/rigs.rs"]
-mod rigs;
-mod support;
-
+use crate::rigs::{arm, paddle, pantograph};
+use crate::support::next;
 use glam::Vec3;
 use mortise_firmware::board::{Drive, Mechanism, Simulation, TICK_S};
 use mortise_haptics::Wrench;
@@ -12,8 +10,6 @@ use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_protocol::rig::Rig;
 use mortise_simulation::described::Described;
 use proptest::prelude::*;
-use rigs::{arm, paddle, pantograph};
-use support::next;
 
 fn any_rig() -> impl Strategy<Value = Rig> {
     prop_oneof![Just(arm()), Just(pantograph()), Just(paddle())]

@@ -1,9 +1,7 @@
 //! Dead encoders and still hands, in closed loop: a spring wall on the encoder readings, the simulated mechanisms, random hands.
 
-#[path = "../../app/tests/support/rigs.rs"]
-mod rigs;
-mod support;
-
+use crate::rigs::{arm, paddle, pantograph};
+use crate::support::next;
 use glam::{Quat, Vec3};
 use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 use mortise_haptics::observer::Rise;
@@ -13,8 +11,6 @@ use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_simulation::described::Described;
 use mortise_simulation::simulated::Simulated;
 use proptest::prelude::*;
-use rigs::{arm, paddle, pantograph};
-use support::next;
 
 /// Either kind of mechanism, with encoders that can be frozen.
 trait Rig: Mechanism + Simulation {

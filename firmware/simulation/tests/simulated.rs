@@ -1,14 +1,12 @@
 //! The simulated mechanism against closed forms, and under any script.
 
-mod support;
-
+use crate::support::next;
 use glam::{Quat, Vec3};
 use mortise_firmware::board::{Drive, Mechanism, Simulation};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_simulation::simulated::*;
 use proptest::prelude::*;
-use support::next;
 
 fn script(position: Vec3, orientation: Quat, push: Vec3) -> HandScript {
     HandScript {

@@ -1,10 +1,8 @@
 //! Rules by which surfaces answer in a cell are right all over the cell, however narrow a slot or rib enters it and however large the cell is.
 
-mod common;
-
 use std::ops::ControlFlow;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DVec2, DVec3};
 use mortise_bake::{BakeOptions, ExactSurface, bake};
 use mortise_brep::{Curve, Edge, Face, Mesh, Shape, Surface};

@@ -1,10 +1,8 @@
 //! The textbook pointshell: a point for each voxel the surface crosses, on moving parts only.
 
-mod common;
-
 use std::ops::ControlFlow;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{BakeOptions, ExactSurface, PointshellKind, bake, classic_pointshell};
 use mortise_protocol::image::SceneImage;

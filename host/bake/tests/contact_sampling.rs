@@ -4,11 +4,9 @@
 //! between them separates the two, so g is exactly their distance; the shells must find it to within ε. A peg in a hole, which no plane separates, is
 //! compared with dense points on its four rims, and on its side where a rim passes a rim.
 
-mod common;
-
 use std::f64::consts::{PI, TAU};
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DMat3, DVec3};
 use mortise_bake::{
     ExactSurface, Met, Partners, Pointshell, PointshellOptions, ShellPoint, sample_pointshell,

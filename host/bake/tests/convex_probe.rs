@@ -1,11 +1,10 @@
 //! Probe of convex pairs against closed forms: boxes by separating axes, box and ball by the distance to the box, cylinders side by side and crosswise.
 
-mod common;
-
+use crate::common;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
-use common::{AlignedBytes, block, box_distance, model, peg, sphere};
+use crate::common::{AlignedBytes, block, box_distance, model, peg, sphere};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use mortise_bake::{BakeOptions, Grabbable, bake};
 use mortise_brep::Shape;

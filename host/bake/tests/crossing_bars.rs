@@ -2,9 +2,7 @@
 //!
 //! Oracle: the separating axes of two boxes, in double precision.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use mortise_bake::{BakeOptions, bake};
 use mortise_haptics::{Input, Pose, Quat, Settings, State, Twist, Vec3, tick};

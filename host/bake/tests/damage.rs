@@ -1,10 +1,8 @@
 //! Written images open; damaged ones are rejected or harmless, for any damage, even with a valid checksum.
 
-mod common;
-
 use std::ops::ControlFlow;
 
-use common::*;
+use crate::common::*;
 use glam::DAffine3;
 use mortise_bake::{BakeOptions, SampleFormat, bake};
 use mortise_protocol::image::{CRC, Lookup, SceneImage};

@@ -1,8 +1,6 @@
 //! Exact distance against closed forms, on tessellations coarse enough that facets alone fail.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_bake::ExactSurface;
 use mortise_brep::{Shape, Surface};

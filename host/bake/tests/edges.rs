@@ -1,8 +1,6 @@
 //! Pieces of sharp convex edges in a baked image: they lie on the exact edges, cover them, and state the thickness of the solid behind them.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{BakeOptions, Grabbable, bake};
 use mortise_brep::Shape;

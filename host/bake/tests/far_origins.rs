@@ -1,10 +1,8 @@
 //! Surfaces whose origin lies far from the shape, as some files have them, answer as accurately as others.
 
-mod common;
-
 use std::ops::ControlFlow;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{BakeOptions, bake};
 use mortise_brep::{Shape, Surface};

@@ -1,12 +1,10 @@
 //! Sampled field against the closed form, through the board's own query.
 
-mod common;
-
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{BakeOptions, BakeReport, SampleFormat, Samples, bake};
 use mortise_brep::Shape;

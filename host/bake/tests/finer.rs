@@ -3,12 +3,10 @@
 //! A block is a box whose upper face is a random bicubic height. A second one, turned over, lies on it with a clearance, so that the free-form faces
 //! fit. The board's own distance is compared with the exact one at random points of the whole grid, near and far.
 
-mod common;
-
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DMat3, DVec3};
 use mortise_bake::{Effort, ExactSurface, Grabbable, Limit, NoCache, Planned, Request, plan_within};
 use mortise_brep::{CadModel, Curve, Edge, Face, FineCurve, Mesh, Shape, SplineSurface, Surface};

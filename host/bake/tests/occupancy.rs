@@ -1,12 +1,10 @@
 //! Voxels against the closed form: those that the surface crosses, those that it does not, and their distance bounds.
 
-mod common;
-
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{BakeOptions, BakeReport, CROSSING_TOLERANCE_CELLS, Method, PROXIMITY_LAYERS, bake};
 use mortise_brep::Shape;

@@ -3,13 +3,11 @@
 //! Accuracy: the image's own query, as the board runs it, is compared with the exact surface at random points near faces. Where a distance is
 //! interpolated next to an edge, the documented half cell is checked instead.
 
-mod common;
-
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{Effort, ExactSurface, Grabbable, Limit, NoCache, Planned, Request, plan, plan_within};
 use mortise_brep::{CadModel, Shape, Surface, load_step};

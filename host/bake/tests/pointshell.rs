@@ -1,11 +1,9 @@
 //! The pointshell lies on the exact surface, inside the trim, as dense as requested and no denser than needed. The omission of points that partners
 //! make redundant is tested in `contact_sampling.rs`.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::*;
+use crate::common::*;
 use glam::DVec3;
 use mortise_bake::{ExactSurface, Pointshell, PointshellOptions, ShellPoint, sample_pointshell};
 use mortise_brep::Shape;

@@ -1,11 +1,9 @@
 //! Probe of parts that are not convex against closed forms: a peg about the hole of a block. Nothing is called exact that is off by over a micrometre,
 //! every stated error holds, and a free pose has no contact. First touches along motions.
 
-mod common;
-
 use std::ops::ControlFlow;
 
-use common::{AlignedBytes, block, block_with_hole, model, peg, sphere};
+use crate::common::{AlignedBytes, block, block_with_hole, model, peg, sphere};
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_bake::{BakeOptions, Grabbable, bake};
 use mortise_brep::Shape;

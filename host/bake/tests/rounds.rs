@@ -1,11 +1,9 @@
 //! Rounds and fillets answer by their surfaces in cells as large as their radii: smooth edges separate the faces that meet there.
 
-mod common;
-
 use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_bake::{BakeOptions, ExactSurface, bake};
 use mortise_brep::{Shape, Surface};

@@ -1,11 +1,9 @@
 //! Samples are stored only where they are interpolated: without the others the tick gets the same distances, contacts and forces, to the bit.
 
-mod common;
-
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use common::*;
+use crate::common::*;
 use glam::DAffine3;
 use mortise_bake::{BakeOptions, Grabbable, Samples, bake};
 use mortise_brep::{CadModel, load_step};

@@ -1,11 +1,9 @@
 //! Whole scenes: shared data, grabbable parts, fit to the limit, rejected input.
 
-mod common;
-
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use common::*;
+use crate::common::*;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_bake::{BakeError, BakeOptions, Baked, Grabbable, SampleFormat, Samples, Stage, bake};
 use mortise_brep::{CadModel, Shape};

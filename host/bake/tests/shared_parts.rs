@@ -2,12 +2,10 @@
 //!
 //! They are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; if they are absent the tests report it and pass.
 
-mod common;
-
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use common::*;
+use crate::common::*;
 use glam::DVec3;
 use mortise_bake::{BakeError, BakeOptions, Baked, ExactSurface, bake};
 use mortise_brep::{CadModel, Surface, load_step};

@@ -1,12 +1,10 @@
 //! Assemblies whose parts are in separate files beside them: they read like the same assembly in one file, and nothing outside the folder is read.
 //! Reads in-process.
 
-mod support;
-
+use crate::support::{self, Product, StepText};
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{BrepError, CadModel, load_step};
 use std::path::Path;
-use support::{Product, StepText};
 
 const SUBS: usize = 4;
 const PARTS: usize = 8;

@@ -1,11 +1,9 @@
 //! The thesis pair against closed forms, and legal and illegal variants of its text. Reads in-process.
 
-mod support;
-
+use crate::support::{self, check};
 use glam::DVec3;
 use mortise_brep::{BrepError, CadModel, Curve, LoadOptions, Surface, load_step, load_step_with};
 use std::f64::consts::PI;
-use support::check;
 
 fn pair() -> String {
     std::fs::read_to_string(support::data("pair_d18.75_clear1.00.step")).unwrap()

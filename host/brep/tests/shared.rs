@@ -1,12 +1,10 @@
 //! Every shared test part against `expected.json` and `real/manifest.csv`. Skipped with a note when they are absent.
 
-mod support;
-
+use crate::support::{self, check};
 use mortise_brep::{CadModel, LoadOptions, Surface, load_step_with};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use support::check;
 
 /// The shared folder, or a note that the test is skipped.
 fn shared(test: &str) -> Option<PathBuf> {

@@ -1,13 +1,12 @@
 //! STEP texts written by the tests, compared with arithmetic results. Reads in-process.
 
-mod support;
-
+use crate::support;
 use std::f64::consts::PI;
 
+use crate::support::StepText;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use mortise_brep::{BrepError, CadModel, LoadOptions, Surface, load_step, load_step_with};
 use proptest::prelude::*;
-use support::StepText;
 
 fn load(text: &str) -> Result<CadModel, BrepError> {
     load_step(support::file(text))

@@ -1,12 +1,10 @@
 //! Clearances and maps of them against closed forms.
 
-mod support;
-
+use crate::support::shapes;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_inspect::{ClearanceMap, MapOptions, Pair, Solid, TOUCH_MM, clearance_map, clearances};
 use mortise_task::{Body, Placed};
 use proptest::prelude::*;
-use support::shapes;
 
 fn place(bodies: &[(Body, DAffine3)], within: f64) -> Vec<Pair> {
     let placed: Vec<Placed<'_>> = bodies

@@ -1,15 +1,13 @@
 //! Measurements against closed forms, at random poses.
 
-mod support;
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 
+use crate::support::shapes;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_inspect::measure::{
     About, Angle, Comparison, Entity, Feature, Placed, Radial, Round, compare, least,
 };
 use proptest::prelude::*;
-use support::shapes;
 
 /// Rounding of some projections on lengths up to 100 mm, and what a descent at rest leaves.
 const EXACT_MM: f64 = 1e-8;

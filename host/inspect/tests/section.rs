@@ -1,14 +1,12 @@
 //! Sections against closed forms, and caps against the volume of the mesh that they cut.
 
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::support::{assert_no_leak, shapes, volume_below};
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::Shape;
 use mortise_inspect::{CutPlane, Fineness, Section, Solid, section};
 use proptest::prelude::*;
-use support::{assert_no_leak, shapes, volume_below};
 
 /// Relative error of areas: by [`Fineness::Exact`] the sides of a full circle lack 2.7·10⁻⁴ of its area, of an arc less.
 const AREA: f64 = 3e-4;

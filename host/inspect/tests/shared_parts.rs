@@ -1,10 +1,8 @@
 //! Sections of every shared part that reads, against the CAD kernel's volume and the mesh's. Skipped with a note when they are absent.
 
-mod support;
-
+use crate::support::{self, volume_below};
 use glam::{DAffine3, DVec3};
 use mortise_inspect::{CutPlane, Fineness, Solid, section};
-use support::volume_below;
 
 /// Planes across each part of more than 5,000 triangles, and of fewer.
 const PLANES: [usize; 2] = [48, 160];

@@ -1,8 +1,7 @@
 //! Invariance of contacts under motion of the assembly, order of its parts, and splitting of faces. Common areas are
 //! compared with closed forms. Files are read in-process; they are this project's test parts.
 
-mod build;
-
+use crate::build;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use std::sync::OnceLock;

@@ -1,8 +1,6 @@
 //! Regions of planes: area, middle and common area against closed forms.
 
-#[allow(dead_code)]
-mod build;
-
+use crate::build;
 use std::f64::consts::PI;
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};

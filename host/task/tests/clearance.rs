@@ -1,7 +1,6 @@
 //! Clearances and sweeps against closed forms: a peg of 17.75 mm in a hole of 18.75 mm, moved sideways, tilted and turned.
 
-mod support;
-
+use crate::support;
 use std::sync::OnceLock;
 
 use glam::{DAffine3, DQuat, DVec3};

@@ -1,7 +1,6 @@
 //! Freedoms against those known by hand: this project's joints, and the shared box with its board, lid and screws.
 
-mod support;
-
+use crate::support;
 use glam::{DAffine3, DVec3};
 use mortise_task::mobility::{Freedoms, Reach, freedoms};
 use mortise_task::{Assembly, Moved};

@@ -1,7 +1,6 @@
 //! Steps of a sequence as a hand does them: a part, or a group that one of its parts leads.
 
-mod support;
-
+use crate::support;
 use std::time::Duration;
 
 use glam::{DQuat, DVec3};

@@ -1,7 +1,6 @@
 //! Parts joined to one shape: their mass is that of their triangles, and distances outside are the least of theirs.
 
-mod support;
-
+use crate::support;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use mortise_brep::Shape;
 use mortise_task::Body;

@@ -1,7 +1,6 @@
 //! Ports and connections of this project's test parts, and of random pairs with a profile in a hole.
 
-mod support;
-
+use crate::support;
 use mortise_shapes::KINDS;
 use mortise_task::graph::{Edge, graph};
 use mortise_task::ports::{Geometry, Port, ports};

@@ -1,7 +1,6 @@
 //! Ways out and sequences on the shared extraction tasks: found, free by the exact distance at every waypoint, and in an order that meets every constraint.
 
-mod support;
-
+use crate::support;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

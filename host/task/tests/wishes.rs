@@ -1,7 +1,6 @@
 //! Held parts stay, and what is said to fall does fall.
 
-mod support;
-
+use crate::support;
 use std::time::Duration;
 
 use glam::{DAffine3, DVec3};

@@ -1,7 +1,6 @@
 //! Flats on flats with bores in line: the motor's covers on its body, from where the exploded file has them and from any place.
 
-mod support;
-
+use crate::support;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::CadModel;
 use mortise_words::{Outcome, Session};

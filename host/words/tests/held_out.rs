@@ -1,8 +1,7 @@
 //! The list of instructions written before the grammar, on the shared assemblies: outcome, acts, candidates and codes as expected, and nothing done
 //! that is not expected to be done.
 
-mod support;
-
+use crate::support;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,6 @@
 //! The motor from its parts scattered: magnets laid on flats, and everything put together by words.
 
-mod support;
-
+use crate::support;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::Part;
 use mortise_words::{Code, Outcome, Session};

@@ -9,6 +9,7 @@ mod functions;
 mod layers;
 mod sources;
 mod subjects;
+mod tests_named;
 mod tree;
 mod unsafety;
 mod words;
@@ -43,7 +44,7 @@ pub fn command() -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks that need no program: paths in docs, the book's contents, length and words of sources, reasons for `unsafe`, layers, import circles, subjects of commits, what
+/// Checks that need no program: paths in docs, the book's contents, length and words of sources, reasons for `unsafe`, files of tests, layers, import circles, subjects of commits, what
 /// figures were made from.
 ///
 /// # Errors
@@ -58,6 +59,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     }
     findings.extend(docs::check_paths(root, &files)?);
     findings.extend(contents::check(root, &files)?);
+    findings.extend(tests_named::check(root, &files)?);
     findings.extend(layers::check(root, &files)?);
     findings.extend(circles::check(root, &files)?);
     findings.extend(functions::check(root, &files)?);

@@ -1,0 +1,15 @@
+//! Integration tests of this crate: one program, which is linked once and whose tests share both cores.
+
+mod control;
+mod freshness;
+mod link;
+mod motor_test;
+mod placing;
+mod position_scale;
+mod recording;
+mod reset;
+mod rig;
+mod store;
+mod store_states;
+mod support;
+mod upload;
