@@ -292,12 +292,17 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         );
     }
 
+    /// The position scale in use.
+    fn scale(&self) -> PositionScale {
+        PositionScale(self.settings.law.passivity.position_scale)
+    }
+
     /// Computes this tick's wrench and applies it to the motors.
     fn render(&mut self) {
         self.rendered.output = None;
         let motors = self.safety.motors();
         if let (Motors::Zero | Motors::Rendered, Some(scene)) = (motors, &self.scene) {
-            let scale = self.rendered.scale;
+            let scale = self.scale();
             let (handle, handle_twist) = scale.handle(&self.sensed);
             let input = Input {
                 handle,
@@ -331,7 +336,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         let wanted = match (self.safety.motors(), &self.rendered.output) {
             (Motors::Off | Motors::Tested, _) => None,
             (Motors::Fading, _) => Some(self.fading()),
-            (Motors::Zero | Motors::Rendered, Some(output)) => Some(self.rendered.scale.felt(output.handle)),
+            (Motors::Zero | Motors::Rendered, Some(output)) => Some(self.scale().felt(output.handle)),
             (Motors::Zero | Motors::Rendered, None) => Some(Wrench::ZERO),
         };
         let allowed = wanted.map(|wrench| self.restrained(wrench));

@@ -4,7 +4,6 @@ use mortise_haptics::{Output, Vec3, Wrench};
 use mortise_protocol::limits::MAX_ENCODERS;
 use mortise_protocol::message::{DeviceState, Fault, Refusal, Statistics};
 
-use super::position_scale::PositionScale;
 use crate::channel::Reply;
 use crate::safety::Safety;
 use crate::statistics::StateHash;
@@ -101,8 +100,6 @@ pub(super) struct Rendered {
     pub ramp: u16,
     /// Ticks since the soft stop began, and the wrench at its start.
     pub fade: (u16, Wrench),
-    /// How far the held part moves with the handle, or the next one will.
-    pub scale: PositionScale,
 }
 
 impl Rendered {
@@ -112,7 +109,6 @@ impl Rendered {
         commanded: Wrench::ZERO,
         ramp: 0,
         fade: (0, Wrench::ZERO),
-        scale: PositionScale::ONE,
     };
 }
 

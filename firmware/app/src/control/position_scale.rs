@@ -34,7 +34,6 @@ impl PositionScale {
         law.limits.force_slew_n_per_s /= self.0;
         law.passivity.damping /= self.0 * self.0;
         law.passivity.position_count_m *= self.0;
-        law.passivity.position_scale = self.0;
         law
     }
 

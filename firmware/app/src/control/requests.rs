@@ -6,7 +6,6 @@ use mortise_protocol::message::{ConstraintTarget, Fault, Refusal};
 use mortise_protocol::parameter::ParameterId;
 
 use super::ControlPlane;
-use super::position_scale::PositionScale;
 use crate::board::{Clock, Mechanism};
 use crate::channel::{CommandKind, Event, Reply};
 use crate::safety::{Action, Event as SafetyEvent};
@@ -28,8 +27,9 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
                 self.request(SafetyEvent::Clear { cause_gone })
             }
             CommandKind::Settings(settings) => {
+                let in_use = self.settings.law.passivity.position_scale;
                 self.settings = settings;
-                self.adopt_scale();
+                self.adopt_scale(in_use);
                 Ok(())
             }
             CommandKind::Grab(part) => self.grab(part),
@@ -122,14 +122,14 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
     }
 
     fn grab(&mut self, part: u16) -> Result<(), Refusal> {
-        self.adopt_scale();
+        self.adopt_scale(self.settings.law.passivity.position_scale);
         let Some(scene) = &self.scene else {
             return Err(Refusal::NoScene);
         };
         if let (_, Action::Refuse(reason)) = self.safety.step(SafetyEvent::Grab) {
             return Err(reason);
         }
-        let (handle, _) = self.rendered.scale.handle(&self.sensed);
+        let (handle, _) = self.scale().handle(&self.sensed);
         self.ends
             .law
             .grab(scene, part, &handle)
@@ -142,15 +142,18 @@ impl<'s, M: Mechanism, C: Clock> ControlPlane<'_, 's, M, C> {
         self.request(SafetyEvent::Grab)
     }
 
-    /// Takes over the position scale of the settings, unless a part is held: that would jump. What is left of the last part's force ends.
-    fn adopt_scale(&mut self) {
-        let scale = PositionScale(self.settings.parameters.get(ParameterId::PositionScale));
-        if self.ends.law.grabbed().is_none() && scale != self.rendered.scale {
-            self.rendered.scale = scale;
+    /// Takes over the position scale of the parameters, unless a part is held: that would jump. Then the one `in_use` stays. What is left of the last part's
+    /// force ends with another one.
+    fn adopt_scale(&mut self, in_use: f32) {
+        let scale = if self.ends.law.grabbed().is_none() {
+            self.settings.parameters.get(ParameterId::PositionScale)
+        } else {
+            in_use
+        };
+        if scale != in_use {
             self.ends.law.restart_slew();
         }
-        // With another one in use this tick's bounds are those of another handle.
-        self.settings.law.passivity.position_scale = self.rendered.scale.0;
+        self.settings.law.passivity.position_scale = scale;
     }
 
     fn set_target(&mut self, target: &ConstraintTarget) -> Result<(), Refusal> {

@@ -1,16 +1,29 @@
 //! Pairs that are apart as a whole: nothing below the roots of their trees is looked at.
 //!
-//! While the bounds of the roots hold not even the shapes are. Then the boxes tell: their gap is the same in both directions, and for the edges, and is
-//! found once a tick for each part. Cost: some 250 instructions.
+//! Where the spheres about two parts are apart, or while the bounds of the roots hold, not even the shapes are. Then the boxes tell: their gap is the same
+//! in both directions, and for the edges, and is found once a tick for each part. Cost: some 250 instructions.
 
 use crate::collision::coherence::{Bound, Known};
 use crate::collision::cost::{LOOKUP, NODE, PASSED_OVER};
 use crate::collision::directed_pair::DirectedPair;
+use crate::collision::edge_crossing::are_within;
 use crate::collision::node_key::{Key, Keys};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
+    /// Whether the bounding spheres of the two parts of directed pair `index` come within the margin of each other.
+    #[inline]
+    pub fn spheres_meet(&self, index: u16) -> bool {
+        let (search, part) = (self.search, index / 2);
+        let placed = |part: u16| search.parts.get(usize::from(part));
+        let (Some(other), Some(held)) = (placed(part), placed(search.held)) else {
+            return false;
+        };
+        let (sphere, reach) = ((search.middle, held.radius), search.margin + search.shrunk_m);
+        part != search.held && are_within(sphere, (other.center, other.radius), reach)
+    }
+
     /// Passes over directed pair `index` where the bounds of the roots of its trees still hold, without a look at its shapes. Returns whether it did.
     pub fn pass_over(&mut self, index: u16) -> bool {
         let (part, held) = (usize::from(index / 2), usize::from(self.search.held));

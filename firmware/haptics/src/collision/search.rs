@@ -144,18 +144,6 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         (stop, used)
     }
 
-    /// Whether the bounding spheres of the two parts of directed pair `index` are near each other.
-    #[inline]
-    fn is_near(&self, index: u16) -> bool {
-        let part = index / 2;
-        let placed = |part: u16| self.parts.get(usize::from(part));
-        let (Some(other), Some(held)) = (placed(part), placed(self.held)) else {
-            return false;
-        };
-        let apart = held.radius + other.radius + self.margin + self.shrunk_m;
-        part != self.held && (self.middle - other.center).length_squared() <= apart * apart
-    }
-
     /// Directed pair `index`; `None` where the scene has no such part.
     fn pair(&self, index: u16) -> Option<DirectedPair<'i>> {
         let part = index / 2;
@@ -272,7 +260,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let last = end.map_or(pairs, |e| (e.pair + 1).min(pairs));
         for index in start.pair..last {
             let is_whole = index != start.pair && end.is_none_or(|end| end.pair != index);
-            if !self.search.is_near(index) || is_whole && self.pass_over(index) {
+            if !self.spheres_meet(index) || is_whole && self.pass_over(index) {
                 continue;
             }
             let Some(pair) = self.search.pair(index) else {

@@ -34,7 +34,7 @@ const LANDING_SHARE: f32 = 0.8;
 const ROUGH_SOLVES: u8 = 4;
 
 /// Stiffness where an edge meets a face or another edge, as a multiple of a point's: in one place, where faces meet in many points.
-const SINGLE: f32 = 2.0;
+const SINGLE: f32 = 4.0;
 
 /// Stiffness of contacts, N/m.
 #[derive(Clone, Copy, Debug)]
