@@ -5,8 +5,8 @@
 //! instructions of the eighths that the budget counts for it.
 //!
 //! Source: a regression of instructions on counts over 13 motions on the emulated board, `docs/notes/2026-11-22-what-a-touching-point-costs.md`; a
-//! test holds the table to within an eighth of it. Surfaces beside others, pairs and what edges take: a regression over crowded ticks,
-//! `docs/notes/2026-11-29-what-a-crowded-tick-costs.md`; the rows of edges are too dear rather than too cheap.
+//! test holds the table to within an eighth of it. Surfaces beside others, pairs, contacts that push, spans and what edges take: a regression over crowded ticks,
+//! `docs/notes/2026-11-29-what-a-crowded-tick-costs.md`.
 
 pub use super::contact::MAX_CONTACTS;
 
