@@ -1,4 +1,4 @@
-//! Integration tests of this crate: one program, which is linked once and whose tests share both cores.
+//! Integration tests of this package: one program, which is linked once.
 
 mod external;
 mod pair;

@@ -17,14 +17,15 @@ const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// cases each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
 /// Test programs that take longest, longest first: they are begun first, so that none of them runs alone at the end.
-const LONGEST: [&str; 7] = [
-    "host/bake signs",
+const LONGEST: [&str; 8] = [
     "host/app window",
+    "host/bake all",
+    "host/bake signs",
     "host/lab mortise_lab",
-    "host/bake shared_parts",
+    "host/task all",
+    "host/inspect all",
     "host/record sessions",
     "firmware/orders depth",
-    "host/bake free_form",
 ];
 const BOARD_SIDE: [&str; 5] = [
     "mortise-protocol",
