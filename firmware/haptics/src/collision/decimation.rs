@@ -83,13 +83,18 @@ impl Decimation {
     /// Adapts the level to the outcome of a search.
     pub fn update(&mut self, searched: &Searched) {
         let overrun = self.count_overrun(searched);
-        let Searched { touching, lost, .. } = *searched;
-        let calm =
-            searched.stopped.is_none() || !self.helps_with(2 * searched.used.point_work, searched.budget);
+        let Searched {
+            touching,
+            lost,
+            budget,
+            ..
+        } = *searched;
+        let point_work = searched.used.point_work;
+        let calm = searched.stopped.is_none() || !helps(self.level.saturating_sub(1), 2 * point_work, budget);
         self.calm = if calm { self.calm.saturating_add(1) } else { 0 };
         if lost > 0 {
             self.decimate_to_fit(touching + lost);
-        } else if overrun && self.level < MAX_DECIMATION && self.helps(searched) {
+        } else if overrun && self.level < MAX_DECIMATION && helps(self.level, point_work, budget) {
             self.level += 1;
             self.patience = MAX_FIRST_OVERRUNS;
         } else if self.level > 0 && self.calm >= CALM_TICKS && has_capacity(searched) {
@@ -114,18 +119,6 @@ impl Decimation {
         overrun
     }
 
-    /// Whether half the points would reduce the work noticeably, because points rather than the traversal dominate it. Where whole leaves would be
-    /// decimated, points must dominate so far that there are enough leaves for every face to keep some.
-    fn helps(&self, searched: &Searched) -> bool {
-        self.helps_with(searched.used.point_work, searched.budget)
-    }
-
-    /// As [`Self::helps`], with this work on points.
-    fn helps_with(&self, point_work: u32, budget: u32) -> bool {
-        let part = if self.level < LEAF_DECIMATION { 4 } else { 2 };
-        part * point_work > budget
-    }
-
     /// Raises the level until `touching` points, counted at the present level, fill at most three quarters of the store.
     ///
     /// More points than the store holds must not touch: the selection of kept contacts would follow the last tick's tilt and tilt the part the other
@@ -137,6 +130,13 @@ impl Decimation {
             touching /= 2;
         }
     }
+}
+
+/// Whether half the points would reduce the work of a search at this level noticeably, because points rather than the traversal dominate it. Where whole
+/// leaves would be decimated, points must dominate so far that there are enough leaves for every face to keep some.
+fn helps(level: u8, point_work: u32, budget: u32) -> bool {
+    let part = if level < LEAF_DECIMATION { 4 } else { 2 };
+    part * point_work > budget
 }
 
 /// Whether twice the points would fit. The traversal to them costs the same as before. Where it exceeds the budget by itself, they do if they would
@@ -282,15 +282,17 @@ mod tests {
                 ..stopped(5, 40)
             }
         };
-        // Twice that would be most of the work.
-        for _ in 0..10 * CALM_TICKS {
-            o.update(&spent_on_points(126));
-        }
-        assert_eq!(o.level(), MAX_DECIMATION);
-        for _ in 0..10 * CALM_TICKS {
-            o.update(&spent_on_points(62));
-        }
-        assert_eq!(o.level(), 0);
+        let level_after = |o: &mut Decimation, point_work| {
+            for _ in 0..10 * CALM_TICKS {
+                o.update(&spent_on_points(point_work));
+            }
+            o.level()
+        };
+        // Twice that would raise the level again: where whole leaves are decimated half of the budget, else a quarter.
+        assert_eq!(level_after(&mut o, 126), MAX_DECIMATION);
+        assert_eq!(level_after(&mut o, 125), LEAF_DECIMATION);
+        assert_eq!(level_after(&mut o, 63), LEAF_DECIMATION);
+        assert_eq!(level_after(&mut o, 62), 0);
     }
 
     proptest! {
