@@ -85,8 +85,8 @@ settings_group! {
         /// Distance within which points enter the step, m: by the end of a tick with twice the motion so far, or twice the motion without contacts.
         margin_m: f32 = 5e-6, 1e-6 => 1e-3;
         /// Largest work of a tick, in field queries of about 190 instructions: a tree node queried counts 1½, a point out of reach 1, one within the margin
-        /// 1¾, one that may touch 3⅛, a solve 8 and 2½ more for each target ([`crate::cost`]). With the default a tick of two parts takes 120,000
-        /// instructions at most, and one of a crowded assembly 120,000 on average (`mortise-lab figures contact` and `plan`).
+        /// 1¾, one that may touch 3⅛, a solve 8 and 2½ more for each target ([`crate::cost`]). With the default the ticks of
+        /// `mortise-lab figures contact` take 120,000 instructions at most, and those of a crowded assembly (`figures plan`) 220,000.
         point_budget: u32 <- PointBudget, 16 => 100_000;
         /// Distance by which points of the held part are moved inward along their normals for voxmap queries, in voxels of that part: the textbook's
         /// pointshell shrinking. Distance fields have no shrinking. Beyond a voxel points lie outside of their own voxels, on the wrong side.
