@@ -72,6 +72,7 @@ const VERBS: &[&str] = &[
     "Disable",
     "Disconnect",
     "Divide",
+    "Double",
     "Document",
     "Drain",
     "Draw",
