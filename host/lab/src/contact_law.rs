@@ -1,7 +1,7 @@
 //! The contact law evaluated on the exact surfaces: the force on the moving part that both pointshells would produce if every distance were that of
 //! the exact surface.
 //!
-//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, and twice that for the deepest place of each span of an edge, found by a
+//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, and four times that for the deepest place of each span of an edge, found by a
 //! search of its own, and for each two edges that cross ([`crate::crossing_law`]); φ is its signed distance from the other part's exact surface at the end of
 //! the tick (f64, CAD faces; no field; of the image only the positions of points and spans), φ̇ its change over the tick, along the exact surface's
 //! normal. The sum is compared with the contact force that the board reports for the same tick.

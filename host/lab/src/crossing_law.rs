@@ -9,7 +9,7 @@ use mortise_protocol::image::{EdgeRecord, oct_decode};
 use mortise_scenario::wire::vector;
 
 /// Stiffness of a crossing, and of a span, as a multiple of a point's.
-pub(crate) const STIFFNESS: f64 = 2.0;
+pub(crate) const STIFFNESS: f64 = 4.0;
 /// Sine of the smallest angle between edges that cross, and between two curved ones.
 const LEAST_SINE: f64 = 0.005;
 const LEAST_SINE_OF_CURVES: f64 = 0.1;
