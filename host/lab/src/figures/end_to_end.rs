@@ -59,8 +59,8 @@ const FLAT_OFF_N: f64 = 0.18;
 const WALL_OFF_N: f64 = 0.024;
 /// Largest difference between the force on the handle and the contact force while the hand starts, turns and stops, N: 0.1 kg at 0.5 m/s².
 const FELT_OFF_N: f64 = 0.05;
-/// Deepest penetration, mm: 5 N on the two points of a wall's rims, 12.5 µm.
-const DEEPEST_MM: f64 = 12.5e-3;
+/// Deepest penetration, mm: 5 N on the two spans of a wall's rims, 800 kN/m each.
+const DEEPEST_MM: f64 = 3.125e-3;
 const TOUCHING: &str = include_str!("../../../../hil-tests/scenarios/insertion_touching.toml");
 const LOAD: &str = include_str!("../../../../hil-tests/scenarios/load.toml");
 
