@@ -41,9 +41,9 @@ const FASTER: f32 = 2.0;
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; with another one the result is safe but meaningless.
 ///
 /// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-29, thesis pair with 20 µm clearance baked at 0.5 mm cells
-/// with a pointshell of 25 µm: at most 72,380 instructions pressed to the wall with 5 N and slid at 10 mm/s, 15,740 in free motion; with a
-/// pointshell of 5 µm 72,680 and 15,740. A peg of 0.7 m with 0.2 mm clearance and a shell of 50 µm, pressed in the same way and slid at 20 mm/s,
-/// takes 93,560 (`mortise-lab figures contact --quick`). Into a fit of 0.02 mm: 87,020 guided, 90,500 by collision alone; 80,140 with four
+/// with a pointshell of 25 µm: at most 65,480 instructions pressed to the wall with 5 N and slid at 10 mm/s, 15,440 in free motion; with a
+/// pointshell of 5 µm 65,780 and 15,440. A peg of 0.7 m with 0.2 mm clearance and a shell of 50 µm, pressed in the same way and slid at 20 mm/s,
+/// takes 113,200 (`mortise-lab figures contact --quick`). Into a fit of 0.02 mm: 93,140 guided and by collision alone; 79,940 with four
 /// different targets (`mortise-lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
