@@ -15,6 +15,7 @@ const VERBS: &[&str] = &[
     "Accept",
     "Add",
     "Adjust",
+    "Admit",
     "Adopt",
     "Advance",
     "Align",
