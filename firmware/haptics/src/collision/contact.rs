@@ -312,7 +312,7 @@ impl Contacts {
         let list = &mut self.lists[self.current];
         if !self.dropped {
             self.dropped = true;
-            // Places are put in order, which are a byte each, and contacts stay where they are.
+            // Only places, of a byte each, are put in order: contacts are a hundred times as large.
             let mut places: [u8; MAX_CONTACTS] = core::array::from_fn(|place| place as u8);
             let of = |place: u8| &list[usize::from(place)];
             places.select_nth_unstable_by(HALF, |a, b| of(*a).gap.total_cmp(&of(*b).gap));

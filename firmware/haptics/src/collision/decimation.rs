@@ -139,8 +139,8 @@ fn helps(level: u8, point_work: u32, budget: u32) -> bool {
     part * point_work > budget
 }
 
-/// Whether twice the points would fit. The traversal to them costs the same as before. Where it exceeds the budget by itself, they do if they would
-/// not be decimated for it.
+/// Whether twice the points would fit. The traversal to them costs the same as before. Where the budget ran out although points take little of
+/// it, so that the level has been calm, their number decides nothing.
 fn has_capacity(searched: &Searched) -> bool {
     let has_capacity = |filled: u32, of: u32| 9 * filled < NINTHS * of;
     let twice = searched.used.all + searched.used.point_work;

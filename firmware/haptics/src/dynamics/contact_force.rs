@@ -33,7 +33,8 @@ const LANDING_SHARE: f32 = 0.8;
 /// Solves after which only [`RATE_BAND_M_PER_S`] applies, since a contact that has not settled by then at the finer bands may never do so.
 const ROUGH_SOLVES: u8 = 4;
 
-/// Stiffness where an edge meets a face or another edge, as a multiple of a point's: in one place, where faces meet in many points.
+/// Stiffness where an edge meets a face or another edge, as a multiple of a point's: in one place, where faces meet in many points. With two, a
+/// peg of 20 µm clearance that tilts at the mouth of its hole presses 6 µm deep; with four, 3.9.
 const SINGLE: f32 = 4.0;
 
 /// Stiffness of contacts, N/m.
