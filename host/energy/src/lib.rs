@@ -13,8 +13,13 @@
 mod attach;
 mod bake;
 mod baked;
+mod charges;
 pub mod density;
 pub mod field;
+mod flat;
+mod lattice;
+mod minimum;
+mod normal;
 mod of_fit;
 pub mod pair;
 mod stiffness;

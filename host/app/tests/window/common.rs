@@ -79,7 +79,8 @@ pub fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Sessi
                 .collect();
             panic!("never: {what}; messages: {notes:#?}");
         }
-        std::thread::sleep(Duration::from_millis(10));
+        // What takes long is looked at less often: a frame takes as long as what it waits for gets less of a core.
+        std::thread::sleep((begun.elapsed() / 20).clamp(Duration::from_millis(10), Duration::from_millis(60)));
     }
 }
 

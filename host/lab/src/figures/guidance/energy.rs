@@ -237,15 +237,6 @@ impl Subject {
 
 /// Rows of pairs: the worst of each.
 fn all_of(subjects: &[Subject], plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
-    // The bounds are those of the paper's sections; of random pairs it is said what was reached.
-    let bounded = subjects.len() == 1;
-    let judged = |what: String, value: f64, unit: &str, most: f64| {
-        if bounded {
-            Row::at_most(what, value, unit, most)
-        } else {
-            Row::reported(what, value, unit)
-        }
-    };
     let what = |row: &str| match subjects {
         [subject] => format!("board's energy, {}: {row}", subject.what),
         _ => format!(
@@ -260,14 +251,14 @@ fn all_of(subjects: &[Subject], plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
     for (share, place) in [(0.0, "seated"), (0.5, "half in")] {
         let bias = |subject: &Subject| subject.bias(share * subject.followed.depth_mm());
         let aside = worst(&|subject| bias(subject)[0]);
-        out(judged(
+        out(Row::at_most(
             what(&format!("minimum off the fit, {place}")),
             aside,
             "mm",
             BIAS_MM,
         ));
         let tilt = 1e3 * worst(&|subject| bias(subject)[1]);
-        out(judged(
+        out(Row::at_most(
             what(&format!("minimum tilted, {place}")),
             tilt,
             "mrad",
@@ -280,7 +271,7 @@ fn all_of(subjects: &[Subject], plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
             .map(|height| subject.aside(height, &of))
             .fold(0.0, f64::max)
     });
-    out(judged(
+    out(Row::at_most(
         what("least energy sideways off the way, 1 to 5 mm above the mouth"),
         above,
         "mm",
