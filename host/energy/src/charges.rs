@@ -46,6 +46,9 @@ const NEAR_MM: f64 = 0.05;
 pub(crate) const ENOUGH_MM: f64 = 0.1;
 const FAR_MM: [f64; 4] = [1.0, 2.0, 3.0, 4.2];
 const FAR_DIRECTIONS: usize = 8;
+/// Steps back along the way, mm, and how many.
+const BACK_MM: f64 = 0.25;
+const BACK_PLACES: usize = 12;
 
 /// Density of the fixed part at the places of charges at a pose, for the real and the imaginary part of each: the energy of unit charges.
 fn terms(lattice: &Lattice, samples: &[Sample], pose: &DAffine3) -> Vec<f64> {
@@ -163,10 +166,7 @@ pub(crate) fn fit(baked: &BakedEnergy, samples: &[Sample], way: &Way<'_>) -> Opt
             .map(|off| {
                 let [on, beside] = [&off.on, &off.beside].map(|pose| terms(&lattice, samples, pose));
                 let row = beside.iter().zip(&on).map(|(b, a)| ROUND_WEIGHT * (b - a));
-                (
-                    row.collect(),
-                    ROUND_WEIGHT * way.height(off.travel) * rise(off.distance / WIDTH_MM),
-                )
+                (row.collect(), ROUND_WEIGHT * off.wanted)
             })
             .collect();
         normal.add(found.iter().map(|(terms, value)| (&terms[..], *value)));
@@ -197,16 +197,18 @@ fn deviation(rows: &[Row], fitted: &[f64]) -> f64 {
     (beside.sum::<f64>() / count).sqrt()
 }
 
-/// A pose beside the way with less energy than the pose on it.
+/// A pose with less energy than one on the way.
 struct Off {
-    travel: f64,
     on: DAffine3,
     beside: DAffine3,
     /// From one to the other, mm.
     distance: f64,
+    /// How much more energy than on the way is wanted there.
+    wanted: f64,
 }
 
-/// Where the least energy is off the way: over places on it, near it with tilts free and without, and the lowest of some places farther across.
+/// Where the energy is least about places of the way: near it with tilts free and without, the lowest of some places farther across, and of some back towards
+/// the open.
 fn off_way(lattice: &Lattice, baked: &BakedEnergy, way: &Way<'_>) -> Vec<Off> {
     let charges = baked.charges.iter().map(|charge| {
         let at = DVec3::from_array(charge.at.map(f64::from)) / M_PER_MM;
@@ -225,26 +227,41 @@ fn off_way(lattice: &Lattice, baked: &BakedEnergy, way: &Way<'_>) -> Vec<Off> {
         .flat_map(|far| (0..FAR_DIRECTIONS).map(move |i| (far, TAU * i as f64 / FAR_DIRECTIONS as f64)))
         .map(|(far, angle)| [far * angle.cos(), far * angle.sin(), 0.0, 0.0])
         .collect();
-    (0..3 * OFF_PLACES)
+    (0..4 * OFF_PLACES)
         .into_par_iter()
         .filter_map(|i| {
-            let travel = last * (i / 3) as f64 / OFF_PLACES as f64;
-            let on = (way.pose)(travel);
+            let travel = last * (i / 4) as f64 / OFF_PLACES as f64;
+            let (on, height) = ((way.pose)(travel), way.height(travel));
             let start = Start::new(on, axis, on.transform_point3(middle));
-            let x = match i % 3 {
+            let lower = |least: f64| (least < energy(&on)).then_some(());
+            let x = match i % 4 {
                 0 => start.lowest(energy, 2, FINE_MM),
                 1 => start.lowest(energy, 4, FINE_MM),
-                _ => {
+                2 => {
                     let places = far.iter().map(|x| (energy(&start.displaced(x)), *x));
                     let (least, x) = places.min_by(|a, b| a.0.total_cmp(&b.0))?;
-                    (least < energy(&on)).then_some(x)?
+                    lower(least)?;
+                    x
+                }
+                _ => {
+                    let places = (1..=BACK_PLACES).map(|k| travel + BACK_MM * k as f64);
+                    let (least, back) = (places.map(|back| (energy(&(way.pose)(back)), back)))
+                        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+                    lower(least)?;
+                    return Some(Off {
+                        on,
+                        beside: (way.pose)(back),
+                        distance: back - travel,
+                        wanted: height - way.height(back),
+                    });
                 }
             };
+            let distance = x[0].hypot(x[1]).max(x[2].hypot(x[3]));
             Some(Off {
-                travel,
                 on,
                 beside: start.displaced(&x),
-                distance: x[0].hypot(x[1]).max(x[2].hypot(x[3])),
+                distance,
+                wanted: height * rise(distance / WIDTH_MM),
             })
         })
         .collect()

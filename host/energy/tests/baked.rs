@@ -52,6 +52,11 @@ fn the_minimum_is_on_the_way_and_the_stiffness_majorises() {
         assert!(now > before, "{travel}: it falls all the way in");
         before = now;
     }
+    for step in 1..=60 {
+        let travel = 0.05 * f64::from(step);
+        let there = energy.at(&place(travel), DVec3::ZERO).energy;
+        assert!(there > -1.0, "{travel} mm before the fit: {there}");
+    }
     let record = &energy.record;
     let axis = DVec3::from_array(record.way.map(f64::from));
     let mut random = fastrand::Rng::with_seed(1);

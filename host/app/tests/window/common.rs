@@ -80,7 +80,9 @@ pub fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Sessi
             panic!("never: {what}; messages: {notes:#?}");
         }
         // What takes long is looked at less often: a frame takes as long as what it waits for gets less of a core.
-        std::thread::sleep((begun.elapsed() / 20).clamp(Duration::from_millis(10), Duration::from_millis(60)));
+        std::thread::sleep(
+            (begun.elapsed() / 20).clamp(Duration::from_millis(10), Duration::from_millis(60)),
+        );
     }
 }
 
