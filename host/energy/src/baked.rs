@@ -13,7 +13,7 @@
 //! Besides, the baker samples by how much the energy at a displaced pose exceeds its linear model, and states a stiffness that majorises it, for each depth: what
 //! the board's implicit step needs.
 
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DVec3};
 use mortise_protocol::image::{ChargeRecord, Energy, EnergyRecord};
 
 use crate::minimum::{Start, TILT_ARM_MM};
@@ -155,12 +155,4 @@ impl Numbers {
     pub(crate) fn vector(&mut self) -> DVec3 {
         DVec3::new(self.next(), self.next(), self.next())
     }
-}
-
-/// A pose moved by `by` and turned by the rotation vector `turn` (rad) about `about`; lengths in the poses' unit.
-pub fn moved(pose: &DAffine3, by: DVec3, turn: DVec3, about: DVec3) -> DAffine3 {
-    DAffine3::from_translation(about + by)
-        * DAffine3::from_quat(DQuat::from_scaled_axis(turn))
-        * DAffine3::from_translation(-about)
-        * *pose
 }

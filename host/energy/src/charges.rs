@@ -7,10 +7,11 @@ use mortise_protocol::image::ChargeRecord;
 use nalgebra::Complex;
 use rayon::prelude::*;
 
-use crate::baked::{ASIDE_MM, BakedEnergy, M_PER_MM, Numbers, Way, moved, travels};
+use crate::baked::{ASIDE_MM, BakedEnergy, M_PER_MM, Numbers, Way, travels};
 use crate::lattice::Lattice;
 use crate::minimum::{Displacement, Start};
 use crate::normal::Normal;
+use crate::pose::moved;
 
 /// A place of the moving part and its density there, less that beside a plane.
 pub(crate) type Sample = (DVec3, Complex<f64>);

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use nalgebra::Complex;
 
-use crate::density::{Kernel, REACH};
+use crate::kernel::{Kernel, REACH};
 
 /// Intervals of the table over σ, and of Simpson's rule in each.
 const INTERVALS: f64 = 32.0;

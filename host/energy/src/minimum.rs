@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::baked::moved;
+use crate::pose::moved;
 
 /// Arm at which tilts count as displacements, mm, and the first step of the search, mm.
 pub(crate) const TILT_ARM_MM: f64 = 10.0;
