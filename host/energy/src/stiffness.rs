@@ -4,8 +4,7 @@ use glam::{DAffine3, DVec3};
 use mortise_protocol::image::ENERGY_DEPTHS;
 use rayon::prelude::*;
 
-use crate::baked::{ASIDE_MM, BakedEnergy, M_PER_MM, Numbers, Way, travels};
-use crate::pose::moved;
+use crate::baked::{ASIDE_MM, BakedEnergy, M_PER_MM, Numbers, Way, moved, travels};
 
 /// Poses at which the stiffness is sampled, the largest displacement from each, mm, and rotation, rad; and the excess that is none, over the depth.
 const STIFFNESS_POSES: usize = 3000;
