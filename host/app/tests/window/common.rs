@@ -79,7 +79,7 @@ pub fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Sessi
                 .collect();
             panic!("never: {what}; messages: {notes:#?}");
         }
-        // What takes long is looked at less often: a frame takes as long as what it waits for gets less of a core.
+        // The longer it takes the less often it polls: each frame takes processor time from the work it waits for.
         std::thread::sleep(
             (begun.elapsed() / 20).clamp(Duration::from_millis(10), Duration::from_millis(60)),
         );
