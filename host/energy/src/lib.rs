@@ -13,16 +13,26 @@
 mod attach;
 mod bake;
 mod baked;
+mod charges;
 pub mod density;
+mod faults;
 pub mod field;
+mod flat;
+mod kernel;
+mod lattice;
+mod minimum;
+mod normal;
 mod of_fit;
 pub mod pair;
+mod pose;
 mod stiffness;
 
 pub use attach::{AttachError, Placed, attach, bytes};
 pub use bake::bake;
-pub use baked::{BakedEnergy, Cost, Way, moved};
-pub use density::{Density, Kernel};
+pub use baked::{BakedEnergy, Cost, Way};
+pub use density::Density;
 pub use field::Field;
+pub use kernel::Kernel;
 pub use of_fit::of_fit;
 pub use pair::{Felt, Pair, Sample};
+pub use pose::moved;

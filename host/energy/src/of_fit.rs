@@ -8,7 +8,8 @@ use mortise_fit::{Fit, Path, PathKind};
 
 use crate::bake::bake;
 use crate::baked::{BakedEnergy, Way};
-use crate::density::{Density, Kernel};
+use crate::density::Density;
+use crate::kernel::Kernel;
 
 /// The energy that draws part `moving` of `model` along the way in to its `fit` with part `against`. `None` where no way in is known, a part has no
 /// shape, or the shapes have no density for each other. Cost: that of [`bake()`].

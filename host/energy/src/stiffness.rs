@@ -4,7 +4,8 @@ use glam::{DAffine3, DVec3};
 use mortise_protocol::image::ENERGY_DEPTHS;
 use rayon::prelude::*;
 
-use crate::baked::{ASIDE_MM, BakedEnergy, M_PER_MM, Numbers, Way, moved, travels};
+use crate::baked::{ASIDE_MM, BakedEnergy, M_PER_MM, Numbers, Way, travels};
+use crate::pose::moved;
 
 /// Poses at which the stiffness is sampled, the largest displacement from each, mm, and rotation, rad; and the excess that is none, over the depth.
 const STIFFNESS_POSES: usize = 3000;

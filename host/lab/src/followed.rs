@@ -35,6 +35,9 @@ const SETTLING_TICKS: u32 = 150;
 const IN_MM: f64 = 0.1;
 const IN_ASIDE_MM: f64 = 0.5;
 const IN_TURNED_RAD: f64 = 0.02;
+/// Time of a hover, s, and its last ticks, in which the part is at rest.
+const HOVER_S: f64 = 1.5;
+const RESTING_TICKS: usize = 200;
 /// Time of a careless hand from one place to the next, s, and how far it goes aside and out, mm, and turns, rad.
 const WANDER_S: f64 = 0.25;
 const WANDER_MM: f64 = 5.0;
@@ -368,8 +371,8 @@ impl Followed {
         Ok(record(&client, &scenario, &self.scene, None)?)
     }
 
-    /// A hand that goes to a height above the mouth on the way and stays there.
-    pub fn hover(&self, height_mm: f64, help: Help, rig: &RigSpec) -> Result<Seen, LabError> {
+    /// Median of the instructions of a tick with the part at rest on the way, at a height above the mouth; less than 0 is within.
+    pub fn hover(&self, height_mm: f64, help: Help, rig: &RigSpec) -> Result<f64, LabError> {
         let mut scenario = self.helped(help, self.scenario.clone());
         let total = self.travel_mm(&self.start).abs();
         let at = self.way.at(-(self.depth_mm + height_mm));
@@ -378,9 +381,14 @@ impl Followed {
             key(0.0, [0.0; 3], [0.0; 3]),
             key(0.5, offset.to_array(), [0.0; 3]),
         ];
-        scenario.run.duration_s = 1.0;
+        scenario.run.duration_s = HOVER_S;
+        scenario.run.telemetry_every_ticks = 1;
         let client = connect(&scenario, rig)?;
-        Ok(self.seen(&record(&client, &scenario, &self.scene, None)?))
+        let samples = record(&client, &scenario, &self.scene, None)?.samples;
+        let rest = samples.iter().rev().take(RESTING_TICKS);
+        let mut costs: Vec<u32> = rest.map(|sample| sample.cost).collect();
+        costs.sort_unstable();
+        Ok(costs.get(costs.len() / 2).copied().map_or(f64::NAN, f64::from))
     }
 
     /// Largest rise over any interval of the work of the geometric energy on the part and its potential together, mJ, while it is fully engaged: energy

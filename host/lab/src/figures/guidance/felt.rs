@@ -1,6 +1,7 @@
 //! Force over time with the geometric energy (Behandish & Ilieş 2015, fig. 7) on the emulated board: missed ticks, force, overlap, vibration, approaches.
 
 use super::super::{Plan, Row};
+use super::energy::TICK_INSTRUCTIONS;
 use crate::LabError;
 use crate::energy::felt::{CASES, Felt, PLAY_MM, Test, Vibration, play};
 use crate::energy::sections::Section;
@@ -90,10 +91,11 @@ fn rows(test: Test, of: &str, [simulated, emulated]: [&[&Felt]; 2], out: &mut dy
         0.0,
     ));
     let instructions = worst(emulated, &|felt| felt.instructions);
-    out(Row::reported(
+    out(Row::at_most(
         what("instructions of the longest tick"),
         instructions,
         "instructions",
+        TICK_INSTRUCTIONS,
     ));
     let force = worst(emulated, &|felt| felt.peak_n);
     out(Row::reported(what("largest force at the handle"), force, "N"));
