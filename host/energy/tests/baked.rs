@@ -1,5 +1,6 @@
 //! Energies for a scene image: where their minimum is, that their stiffness majorises them, and that an image takes them whole.
 
+use std::f64::consts::TAU;
 use std::io::Write as _;
 
 use glam::{DAffine3, DVec3};
@@ -35,6 +36,28 @@ fn words(image: &[u8]) -> Vec<u32> {
     image.chunks_exact(4).map(four).collect()
 }
 
+/// From 1 to 4 mm aside, at and above the mouth, it draws towards the way.
+fn drawn_in(energy: &BakedEnergy, place: &dyn Fn(f64) -> DAffine3, length_mm: f64, into: DVec3) {
+    let (u, v) = into.any_orthonormal_pair();
+    for height in [0.0, 1.0, 2.0, 4.0] {
+        for aside in [1.0, 2.0, 3.0, 4.0] {
+            for direction in 0..16 {
+                let (sin, cos) = (TAU * f64::from(direction) / 16.0).sin_cos();
+                let at = |d: f64| {
+                    let aside = DAffine3::from_translation((u * cos + v * sin) * d);
+                    energy
+                        .at(&(aside * place(length_mm + height)), DVec3::ZERO)
+                        .energy
+                };
+                assert!(
+                    at(aside + 0.1) > at(aside - 0.1),
+                    "{height} mm above, {aside} mm aside, direction {direction}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn the_minimum_is_on_the_way_and_the_stiffness_majorises() {
     let (energy, fit, fixed) = energy(3);
@@ -57,6 +80,7 @@ fn the_minimum_is_on_the_way_and_the_stiffness_majorises() {
         let there = energy.at(&place(travel), DVec3::ZERO).energy;
         assert!(there > -1.0, "{travel} mm before the fit: {there}");
     }
+    drawn_in(&energy, &place, path.length_mm, into);
     let record = &energy.record;
     let axis = DVec3::from_array(record.way.map(f64::from));
     let mut random = fastrand::Rng::with_seed(1);

@@ -116,7 +116,7 @@ impl<'a> Energy<'a> {
     }
 
     /// Re(ρ·q) and its derivatives at a place of the lattice, in steps from its first node: trilinear between the nodes. `None` beyond the lattice, where
-    /// ρ is zero. Cost with the charge's place and the sums of a tick: about 230 instructions on a Cortex-M7.
+    /// ρ is zero. Cost with the charge's place and the sums of a tick: some 230 instructions on a Cortex-M7, fewer beyond the lattice.
     #[inline]
     pub fn at(&self, place: [f32; 3], [re, im]: [f32; 2]) -> Option<(f32, [f32; 3])> {
         let [width, height, depth] = self.record.size.map(usize::from);

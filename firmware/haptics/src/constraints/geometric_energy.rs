@@ -15,14 +15,12 @@
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
 //!
 //! Source: M. Behandish, H. Ilieş, *Peg-in-Hole Revisited: A Generic Force Model for Haptic Assembly*, JCISE 15(4), 2015, eqs. 11 to 13; rounds and
-//! majoriser are ours. Cost on a Cortex-M7: 230 instructions for each charge of the tick and 1,300 more; none with another method. A tick after one that is busy
-//! with contact takes [`CHARGES_PER_BUSY_TICK`] of them: a part that touches moves slowly, and the model holds until the round is whole. The budget of the search
-//! for contacts is charged for them.
+//! majoriser are ours. Cost on a Cortex-M7: [`CHARGES_PER_TICK`] times 230 instructions and 1,300 more where all charges are in the lattice, a third of it above a mouth;
+//! none with another method.
 
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::{ENERGY_DEPTHS, Energy, SceneImage};
 
-use crate::collision::cost::energy_cost;
 use crate::collision::placement::Placed;
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::force::{ForceTerm, Iterate};
@@ -33,9 +31,7 @@ use crate::math::vector::length;
 use crate::settings::{GuidanceMethod, GuidanceSettings};
 
 /// Charges evaluated in a tick.
-pub(crate) const CHARGES_PER_TICK: u16 = 64;
-/// Charges evaluated in a tick after one that was busy with contact.
-const CHARGES_PER_BUSY_TICK: u16 = 32;
+pub(crate) const CHARGES_PER_TICK: u16 = 192;
 /// Largest change of the engagement a tick.
 const STEP: f32 = 1.0 / 256.0;
 
@@ -213,8 +209,6 @@ pub(crate) struct EnergySituation<'a, 'i> {
     pub period_s: f32,
     /// L, m.
     pub length: f32,
-    /// Whether the last tick was busy with contact.
-    pub busy: bool,
 }
 
 impl GeometricEnergy {
@@ -244,15 +238,6 @@ impl GeometricEnergy {
         self.engagement = 0.0;
         self.round.running = false;
         self.found = None;
-    }
-
-    /// What it takes of a tick's budget, field queries; in a busy tick as in a calm one, since a budget that changed with it would make the next tick calm.
-    pub fn cost(&self) -> u32 {
-        if self.round.running || self.found.is_some() {
-            energy_cost(CHARGES_PER_TICK)
-        } else {
-            0
-        }
     }
 
     /// 0 to 1.
@@ -312,11 +297,7 @@ impl GeometricEnergy {
                 acts: false,
             };
         }
-        let mut left = if at.busy {
-            CHARGES_PER_BUSY_TICK
-        } else {
-            CHARGES_PER_TICK
-        };
+        let mut left = CHARGES_PER_TICK;
         while left > 0 {
             let Some(energy) = at.scene.energy(round.energy as usize) else {
                 self.found = round.acts.then_some(round.model);
@@ -350,8 +331,6 @@ impl GeometricEnergy {
 }
 
 impl Round {
-    /// Adds some of an energy's charges. Not inlined: its loop needs all registers.
-    #[inline(never)]
     fn sum_charges(
         &mut self,
         energy: &Energy<'_>,
@@ -365,7 +344,7 @@ impl Round {
         let origin =
             (back * (self.object.position - fixed.position) - Vec3::from_array(record.origin)) * per_step;
         let center = (back * (self.center - fixed.position) - Vec3::from_array(record.origin)) * per_step;
-        let mut sum = self.sum;
+        let sum = &mut self.sum;
         for charge in charges {
             let place = to_steps * Vec3::from_array(charge.at) + origin;
             let Some((value, slope)) = energy.at(place.to_array(), charge.charge) else {
@@ -377,7 +356,6 @@ impl Round {
             sum.force += force;
             sum.torque += (place - center).cross(force);
         }
-        self.sum = sum;
     }
 }
 
