@@ -66,7 +66,12 @@ impl Session {
             return;
         };
         match found.result {
-            Ok(fits) => fitting.add(found.against, fits),
+            Ok(fits) => {
+                fitting.add(found.against, fits);
+                if let Some(document) = &self.document {
+                    fitting.show_as_it_lies(document);
+                }
+            }
             Err(why) => fitting.failures.push(why),
         }
         if let Some(search) = &mut fitting.search {

@@ -15,6 +15,9 @@ use crate::display::extent::Extent;
 pub const MOST_PARTNERS: usize = 8;
 /// Points of a screw's way, for a turn.
 const POINTS_A_TURN: f64 = 24.0;
+/// Share of the best score with which a fit is as good, and the difference of cosines that is none.
+const AS_GOOD: f64 = 0.99;
+const ALIKE: f64 = 1e-3;
 /// Largest cosine of the angle between the ways of a part and of the same part turned over.
 const TURNED_OVER: f64 = -0.9;
 
@@ -128,6 +131,22 @@ impl Fitting {
         self.offers = all.into_iter().map(|(_, offer)| offer).collect();
     }
 
+    /// Shows, of the fits that are as good as the best one, that in which the part goes in as it lies, until the operator has looked through them: a plug whose ends
+    /// are alike fits either way round.
+    pub(super) fn show_as_it_lies(&mut self, document: &Document) {
+        let (Some(best), false) = (self.offers.first(), self.browsed) else {
+            return;
+        };
+        let good = AS_GOOD * best.fit.score;
+        let mut most = f64::NEG_INFINITY;
+        for (number, offer) in self.offers.iter().enumerate() {
+            let likeness = offer.likeness(document, self.moving).unwrap_or(-1.0);
+            if offer.fit.score >= good && likeness > most + ALIKE {
+                (self.chosen, most) = (number, likeness);
+            }
+        }
+    }
+
     /// Shows the fit of this number.
     pub(super) fn choose(&mut self, number: usize) {
         if number < self.offers.len() {
@@ -190,6 +209,19 @@ impl Offer {
         let (_, rotation, translation) = pose.to_scale_rotation_translation();
         pose.is_finite()
             .then(|| DAffine3::from_rotation_translation(rotation.normalize(), translation))
+    }
+
+    /// Cosine of the angle by which the part's way in is off as it lies now, in the part's frame; without a way of that by which the part is turned.
+    fn likeness(&self, document: &Document, moving: usize) -> Option<f64> {
+        let (here, there) = (document.poses.get(moving)?, self.pose(document)?);
+        let turn = here.matrix3 * there.matrix3.transpose();
+        Some(match &self.fit.path {
+            Some(path) => {
+                let way = self.moved(document)?.transform_vector3(path.direction);
+                way.dot(turn * way)
+            }
+            None => DQuat::from_mat3(&turn).to_axis_angle().1.cos(),
+        })
     }
 
     /// The way of the middle of part `moving` to its place, from outside, mm; empty where no way in is known.
@@ -329,6 +361,30 @@ mod tests {
         );
         fitting.choose(17);
         assert_eq!(fitting.offer().expect("one").fit.placement, shown, "no such fit");
+    }
+
+    #[test]
+    fn of_fits_as_good_as_the_best_the_one_as_the_part_lies_is_shown() {
+        let document = sample();
+        let half = std::f64::consts::PI;
+        let here = document.poses[1];
+        let at = |axis: DVec3, angle: f64| DAffine3::from_quat(DQuat::from_axis_angle(axis, angle)) * here;
+        let over = |score: f64| fit(score, at(DVec3::X, half), -DVec3::Z);
+        let spun = |score: f64| fit(score, at(DVec3::Z, 3.0), -DVec3::Z);
+        for (fits, shown) in [
+            (vec![over(0.9), spun(0.899)], 1),
+            (vec![spun(0.9), over(0.899)], 0),
+            // A worse fit is not shown for that.
+            (vec![over(0.9), spun(0.8)], 0),
+        ] {
+            let mut fitting = of(fits);
+            fitting.show_as_it_lies(&document);
+            assert_eq!(fitting.chosen, shown);
+        }
+        let mut fitting = of(vec![over(0.9), spun(0.9)]);
+        fitting.choose(0);
+        fitting.show_as_it_lies(&document);
+        assert_eq!(fitting.chosen, 0, "the operator chose it");
     }
 
     #[test]
