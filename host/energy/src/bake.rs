@@ -12,7 +12,7 @@ use crate::stiffness::majorise;
 
 /// Charges of an energy.
 const CHARGES: usize = 384;
-/// Places at which the moving part's density is looked at for its charges, about: the second set where the first has minima off the way.
+/// Places at which the moving part's density is looked at for its charges, about: the second set where the first leaves a fault.
 const PLACES: [f64; 2] = [6000.0, 4000.0];
 /// How far from the mating faces it has charges, mm.
 const ABOUT_MM: f64 = 12.0;

@@ -15,8 +15,8 @@
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
 //!
 //! Source: M. Behandish, H. Ilieş, *Peg-in-Hole Revisited: A Generic Force Model for Haptic Assembly*, JCISE 15(4), 2015, eqs. 11 to 13; rounds and
-//! majoriser are ours. Cost on a Cortex-M7: [`CHARGES_PER_TICK`] times 230 instructions and 1,300 more where all charges are in the lattice, a third of it above a mouth;
-//! none with another method.
+//! majoriser are ours. Cost on a Cortex-M7: [`CHARGES_PER_TICK`] times 230 instructions and 1,300 more where all charges are
+//! in the lattice, half of that 2 mm above a mouth; none with another method.
 
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::{ENERGY_DEPTHS, Energy, SceneImage};

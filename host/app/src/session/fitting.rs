@@ -211,7 +211,8 @@ impl Offer {
             .then(|| DAffine3::from_rotation_translation(rotation.normalize(), translation))
     }
 
-    /// Cosine of the angle by which the part's way in is off as it lies now, in the part's frame; without a way of that by which the part is turned.
+    /// Cosine of the angle between the way in and the way in turned along with the part from its orientation in the fit to that of now: a turn about the way does not
+    /// count. Without a way, cosine of the angle between both orientations.
     fn likeness(&self, document: &Document, moving: usize) -> Option<f64> {
         let (here, there) = (document.poses.get(moving)?, self.pose(document)?);
         let turn = here.matrix3 * there.matrix3.transpose();
