@@ -260,10 +260,14 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         subject.rows(plan, out);
         published(subject, out)?;
     }
-    // Pairs that nothing was chosen by: each kind once, in the quick form the first ones.
+    // Each kind once, in the quick form the first ones: pairs on which the weights of the fit were chosen, and pairs that were not looked at before.
     let count = if plan.quick { 2 } else { KINDS };
-    let random = trials(count, |index| Subject::random(2 * KINDS as u64 + index as u64))?;
-    all_of(&random, plan, out);
+    for (first, which) in [(2, "random"), (7, "other random")] {
+        let pairs = trials(count, |index| {
+            Subject::random(first * KINDS as u64 + index as u64)
+        })?;
+        all_of(&pairs, which, plan, out);
+    }
     let round = sections.swap_remove(0);
     at_rest(out)?;
     cost(out)?;
@@ -283,16 +287,16 @@ impl Subject {
     }
 
     fn rows(&self, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
-        all_of(std::slice::from_ref(self), plan, out);
+        all_of(std::slice::from_ref(self), "", plan, out);
     }
 }
 
-/// Rows of pairs: the worst of each.
-fn all_of(subjects: &[Subject], plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
+/// Rows of pairs: the worst of each. `which` names several.
+fn all_of(subjects: &[Subject], which: &str, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
     let what = |row: &str| match subjects {
         [subject] => format!("board's energy, {}: {row}", subject.what),
         _ => format!(
-            "board's energy, {} random pairs of as many kinds: {row}",
+            "board's energy, {} {which} pairs of as many kinds: {row}",
             subjects.len()
         ),
     };
@@ -409,7 +413,7 @@ fn at_rest(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         let [without, with] = [Help::Nothing, Help::Energy].map(|help| followed.hover(height_mm, help, &rig));
         out(Row::at_most(
             format!(
-                "board's energy, thesis pair at 1 mm, emulated, at rest {place}: instructions of a tick, more than without it"
+                "board's energy, thesis pair at 1 mm, emulated, at rest {place}: median of the instructions of a tick, more than without it"
             ),
             with? - without?,
             "instructions",
