@@ -52,6 +52,16 @@ pub(crate) struct Constraints<'a, R> {
     pub guided_share: f32,
     /// Number of saturating springs among the force terms.
     pub springs: usize,
+    /// What geometric energies have taken of the tick's budget, field queries.
+    pub energies: u32,
+}
+
+impl<R> Constraints<'_, R> {
+    /// Field queries of the tick: half of the budget at least, however much energies take.
+    fn budget(&self, settings: &Settings) -> u32 {
+        let whole = settings.contact.point_budget;
+        whole - self.energies.min(whole / 2)
+    }
 }
 
 /// A step, its force terms, and the solution without contacts.
@@ -110,7 +120,7 @@ pub(crate) fn contact_step<T: ForceTerm>(
     constraints: &Constraints<'_, impl FacePairRules>,
     work: &mut Work,
 ) -> Solution {
-    let budget = given.settings.contact.point_budget;
+    let budget = constraints.budget(given.settings);
     let used = search(given, memory, grabbed, (step, free), reach, constraints, work);
     let left = budget.saturating_sub(used);
     // Those carried over are solved for, too.
@@ -137,7 +147,7 @@ fn search(
 ) -> u32 {
     let settings = given.settings;
     let (rules, springs) = (constraints.rules, constraints.springs);
-    let budget = settings.contact.point_budget;
+    let budget = constraints.budget(settings);
     let reserved = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + spring_cost(springs);
     let held_shape = given.scene.shape_of_part(usize::from(grabbed.part));
     let shrunk_m = memory.shrink(settings, &held_shape.field);

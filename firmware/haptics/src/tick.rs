@@ -147,7 +147,7 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     let turning_j = grabbed.turning_energy(step.mass_kg, step.gyration2);
     hand.tank
         .keep(coupled.moving_j + turning_j, settings.passivity.initial_budget_j);
-    let energy = energy_force(&mut hand.energy, given, &grabbed, &step);
+    let energy = energy_force(&mut hand.energy, given, &grabbed, &step, hand.contact.busy);
     let guided = (TargetForce::new(&springs, period_s, length), energy);
     let coupled_force = CouplingForce::new(coupling, &settings.coupling, period_s, length);
     let constrained = (coupled_force, guided);
@@ -165,6 +165,7 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
         rules: &rules,
         guided_share: hand.targets.share(&situation),
         springs: springs.len(),
+        energies: hand.energy.cost(),
     };
     let motion = (&step, terms, &free);
     let solution = contact_step(
@@ -197,6 +198,7 @@ fn energy_force(
     given: &Given<'_, '_>,
     grabbed: &Grabbed,
     step: &Step,
+    busy: bool,
 ) -> Option<EnergyForce> {
     let situation = EnergySituation {
         scene: given.scene,
@@ -204,6 +206,7 @@ fn energy_force(
         grabbed,
         period_s: step.period_s,
         length: step.length,
+        busy,
     };
     energy.step(&situation, &given.settings.guidance)
 }

@@ -19,8 +19,12 @@ use mortise_protocol::image::SceneImage;
 const STEP_N: f32 = 0.05;
 const STEP_NM: f32 = 2e-3;
 /// Charges of a tick, and largest change of the engagement in it.
-const CHARGES_PER_TICK: usize = 192;
+const CHARGES_PER_TICK: usize = 64;
 const ENGAGEMENT_STEP: f64 = 1.0 / 256.0;
+/// Ticks of a round of the 304 charges of `LARGE`.
+const ROUND: u32 = 5;
+/// Share of the stiffness with which a model holds the part while energy is saved.
+const LOOSE_SHARE: f64 = 0.1;
 
 /// Settings with which the part follows the handle regardless of the energy.
 fn stiff_settings() -> Settings {
@@ -183,12 +187,11 @@ fn a_free_part_settles_where_the_energy_is_least() {
     }
 }
 
-/// A round of 304 charges takes two ticks. The wrench in force is that of the model about the pose at which some whole round began, never another one and
+/// A round of 304 charges takes five ticks. The wrench in force is that of the model about the pose at which some whole round began, never another one and
 /// never of a round that is not whole; and from tick to tick it changes by no more than the models' difference, the stiffness's share of the motion,
 /// and a step of the engagement.
 #[test]
 fn the_last_whole_round_acts_and_the_next_one_does_not_jump() {
-    const ROUND: u32 = 2;
     const LED: u32 = 550;
     assert_eq!(
         LARGE.parts.charges.len().div_ceil(CHARGES_PER_TICK),
@@ -200,6 +203,7 @@ fn the_last_whole_round_acts_and_the_next_one_does_not_jump() {
     let depth = 1.0 / f64::from(LARGE.parts.record.largest_force);
     let mut random = Random(9);
     let (mut largest, mut rounds) = (0.0f64, 0u32);
+    let mut held_back = [0u32; 2];
     for _ in 0..20 {
         let (mut state, at) = held(&scene, 1);
         let ends = [0, 1].map(|_| compose(fixed(), LARGE.pose_about(&mut random, 1.0)));
@@ -235,9 +239,12 @@ fn the_last_whole_round_acts_and_the_next_one_does_not_jump() {
             let by = fixed().1.conjugate() * (object.0 - poses[began].0.0);
             let pull = fixed().1 * LARGE.pull(by, DVec3::ZERO).0 * depth;
             assert!(pull.length() < 1.0, "dragged along");
-            let off = (poses[began].1 - pull - force).length();
-            // What single precision puts into another cell has another slope: two charges of 304.
-            assert!(off < 6e-3, "tick {t}: off by {off} N");
+            // With the whole stiffness or the share of it that acts while energy is saved.
+            let [whole, loose] = [1.0, LOOSE_SHARE].map(|by| (poses[began].1 - pull * by - force).length());
+            held_back[usize::from(loose < whole)] += 1;
+            let off = whole.min(loose);
+            // What single precision puts into another cell has another slope: three charges of 304.
+            assert!(off < 9e-3, "tick {t}: off by {off} N");
             if let Some((before, other)) = last {
                 let by = (object.0 - poses[poses.len() - 1].0.0).length();
                 let apart = (poses[began].0.0 - poses[other].0.0).length();
@@ -251,11 +258,12 @@ fn the_last_whole_round_acts_and_the_next_one_does_not_jump() {
             last = Some((force, began));
         }
     }
-    println!("largest change {largest} N of 1 N, {rounds} rounds");
+    println!("largest change {largest} N of 1 N, {rounds} rounds, whole and loose: {held_back:?}");
+    assert!(held_back[0] > 100 && held_back[1] > 100, "{held_back:?}");
     assert!(largest < 0.15 && rounds > 500, "{largest} {rounds}");
 }
 
-/// The guidance's own wrench rises from zero by the engagement's step, though a round takes two ticks, and falls in the same way.
+/// The guidance's own wrench rises from zero by the engagement's step, though a round takes five ticks, and falls in the same way.
 #[test]
 fn the_engagement_begins_with_the_first_whole_round_and_ends_without_a_step() {
     let image = with(&OPEN, &[&LARGE]);
@@ -282,14 +290,14 @@ fn the_engagement_begins_with_the_first_whole_round_and_ends_without_a_step() {
         settings.guidance.method = method;
         let out = tick(&mut state, &scene, &settings, &at_rest(pose_of(goal)));
         let is_on = method == GuidanceMethod::Energy;
-        let steps = f64::from(t.saturating_sub(if is_on { 1 } else { 0 }));
+        let steps = f64::from(t.saturating_sub(if is_on { ROUND - 1 } else { 0 }));
         let share = (steps * ENGAGEMENT_STEP).min(1.0);
         let engaged = if is_on { share } else { 1.0 - share };
         assert_eq!(f64::from(out.guidance.engagement), engaged, "{method:?} tick {t}");
-        // The part yields to each step at the coupling's 20 kN/m; its motion in the three ticks of two rounds counts at the stiffness of the model and
+        // The part yields to each step at the coupling's 20 kN/m; its motion in the nine ticks of two rounds counts at the stiffness of the model and
         // once more at that of the energy.
         let change = f64::from((out.guidance.wrench.force - last.force).length());
-        let yielded = 2.0 * 3.0 * stiffest(&LARGE) / 20e3;
+        let yielded = 2.0 * f64::from(2 * ROUND - 1) * stiffest(&LARGE) / 20e3;
         let bound = (1.0 + yielded) * ENGAGEMENT_STEP;
         assert!(
             yielded < 3.0 && change < bound,
@@ -522,5 +530,52 @@ fn another_grab_begins_anew() {
                 .engagement
         })
         .collect();
-    assert_eq!(steps, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0].map(|i| i / 256.0));
+    assert_eq!(steps, [0.0, 0.0, 0.0, 0.0, 1.0, 2.0].map(|i| i / 256.0));
+}
+
+/// Work of the energy's wrench on a part that is led about the well, less what the well gave: over any interval at most what may be saved, 50 µJ, as long as
+/// the part is slower than 20 mm/s, and one replacement of a model more at up to 300 mm/s.
+#[test]
+fn rounds_make_no_more_than_was_saved() {
+    let image = with(&OPEN, &[&LARGE]);
+    let scene = image.open();
+    let settings = stiff_settings();
+    let depth = 1.0 / f64::from(LARGE.parts.record.largest_force);
+    let mut random = Random(21);
+    let mut worst = 0.0f64;
+    for i in 0..40 {
+        let (mut state, at) = held(&scene, 1);
+        let mut from = compose(fixed(), LARGE.pose_about(&mut random, 1.0));
+        lead(&mut state, &scene, &settings, (frame_of(&at), from), (150, 400));
+        let speed = random.decade(5e-3, 300e-3);
+        let begin = reference(&[&LARGE], frame_of(&state.object().unwrap().0)).0;
+        let (mut work, mut least, mut made) = (0.0, 0.0f64, 0.0f64);
+        for _ in 0..12 {
+            let to = compose(fixed(), LARGE.pose_about(&mut random, 1.0));
+            let turn = (to.1 * from.1.conjugate()).to_scaled_axis();
+            let ticks = ((to.0 - from.0).length() / speed * 1e3)
+                .max(turn.length() / 1.5e-3)
+                .ceil();
+            for t in 1..=ticks as u32 {
+                let share = f64::from(t) / ticks;
+                let before = frame_of(&state.object().unwrap().0);
+                let handle = moved(from, (to.0 - from.0) * share, turn * share);
+                let out = tick(&mut state, &scene, &settings, &at_rest(pose_of(handle)));
+                let after = frame_of(&out.object);
+                let by = after.0 - before.0;
+                let turned = (after.1 * before.1.conjugate()).to_scaled_axis();
+                let wrench = out.guidance.wrench;
+                work += wrench.force.as_dvec3().dot(by) + wrench.torque.as_dvec3().dot(turned);
+                let now = reference(&[&LARGE], after).0;
+                let net = work - (begin - now);
+                least = least.min(net);
+                made = made.max(net - least);
+            }
+            from = to;
+        }
+        worst = worst.max(made);
+        let bound = if speed < 20e-3 { 55e-6 } else { 185e-6 };
+        assert!(made < bound, "{i}: {made} J at {speed} m/s");
+    }
+    println!("{:.1} µJ made at most, depth {:.2} mJ", 1e6 * worst, 1e3 * depth);
 }

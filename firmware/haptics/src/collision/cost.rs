@@ -103,6 +103,10 @@ costs! {
     SOLVE = 1520;
     /// Extra cost of a spring in one solve.
     SPRING_IN_SOLVE = 475;
+    /// Charge of a geometric energy.
+    CHARGE = 230;
+    /// Model of the geometric energies, with what it adds to the solves.
+    MODEL = 2500;
 }
 
 /// Reads of the field's bricks and cells that cost as much as one query, [`LOOKUP`].
@@ -116,6 +120,11 @@ const fn eighths(instructions: u32) -> u32 {
 /// Cost of setting up this many springs, field queries.
 pub(crate) fn spring_cost(springs: usize) -> u32 {
     SPRING * springs as u32 / LOOKUP
+}
+
+/// Cost of the model of geometric energies and of this many charges, field queries.
+pub(crate) fn energy_cost(charges: u16) -> u32 {
+    (MODEL + CHARGE * u32::from(charges)) / LOOKUP
 }
 
 /// Cost of one solve with this many springs, field queries.
@@ -175,6 +184,8 @@ mod tests {
                 ("SPRING", 48),
                 ("SOLVE", 64),
                 ("SPRING_IN_SOLVE", 20),
+                ("CHARGE", 10),
+                ("MODEL", 105),
             ]),
             "{TABLE:#?}"
         );

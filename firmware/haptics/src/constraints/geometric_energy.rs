@@ -6,21 +6,27 @@
 //!
 //! m(δ) = E(X₀) − w₀·δ + ½·δᵀ·K·δ
 //!
-//! with δ the displacement from X₀. K is the writer's majoriser at that depth, so m(δ) ≥ E(X): the next round starts at an energy no higher than the
-//! model's, and replacing one by the other makes no energy. The wrench w₀ − K·δ of the model is linear, and K positive semi-definite, so it enters the
-//! implicit step as it is. Where K·δ would exceed the largest force (a hand that moves the part faster than rounds follow), X₀ is dragged along, which
-//! takes energy. Where no charge is in the lattice, neither force nor stiffness acts. The engagement rises from the first whole round on, in 256 ticks.
+//! with δ the displacement from X₀. The wrench w₀ − K·δ of the model is linear, and K positive semi-definite, so it enters the implicit step as it is. Where
+//! K·δ would exceed the largest force (a hand that moves the part faster than rounds follow), X₀ is dragged along, which takes energy. Where no charge is in
+//! the lattice, neither force nor stiffness acts. The engagement rises from the first whole round on, in 256 ticks.
+//!
+//! K is the writer's majoriser at that depth, or a share of it, [`LOOSE_SHARE`]. With the whole of it m(δ) ≥ E(X), and replacing one model by the next makes
+//! no energy, but for the length of a round the part is held back like by a damper. With the share a part moves freely, and a replacement may make energy. So
+//! each replacement is accounted for: what the model that ends stored at the part's pose, less what the next one stores there, is *saved*, up to
+//! [`MOST_SAVED_J`]. As long as something is saved the share acts, else the whole. What any sequence of rounds makes is therefore at most [`MOST_SAVED_J`] and
+//! the one replacement that overdrew.
 //!
 //! The energy finds and does not hold: interior overlap is left to contact, and a fit that is to be held to micrometres to targets. Its method is chosen
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
 //!
-//! Source: M. Behandish, H. Ilieş, *Peg-in-Hole Revisited: A Generic Force Model for Haptic Assembly*, JCISE 15(4), 2015, eqs. 11 to 13; rounds and
-//! majoriser are ours. Cost on a Cortex-M7: [`CHARGES_PER_TICK`] times 230 instructions and 1,300 more where all charges are
-//! in the lattice, half of that 2 mm above a mouth; none with another method.
+//! Source: M. Behandish, H. Ilieş, *Peg-in-Hole Revisited: A Generic Force Model for Haptic Assembly*, JCISE 15(4), 2015, eqs. 11 to 13; rounds,
+//! majoriser and account are ours. Cost on a Cortex-M7: 230 instructions for each charge of the tick that is in the lattice and 1,300 more; none with another
+//! method. A tick after one that is busy with contact takes [`CHARGES_PER_BUSY_TICK`] of them. The budget of the search for contacts is charged for them.
 
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::{ENERGY_DEPTHS, Energy, SceneImage};
 
+use crate::collision::cost::energy_cost;
 use crate::collision::placement::Placed;
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::force::{ForceTerm, Iterate};
@@ -31,7 +37,13 @@ use crate::math::vector::length;
 use crate::settings::{GuidanceMethod, GuidanceSettings};
 
 /// Charges evaluated in a tick.
-pub(crate) const CHARGES_PER_TICK: u16 = 192;
+pub(crate) const CHARGES_PER_TICK: u16 = 64;
+/// Charges evaluated in a tick after one that was busy with contact.
+const CHARGES_PER_BUSY_TICK: u16 = 32;
+/// Share of the majoriser with which the part is held while energy is saved.
+const LOOSE_SHARE: f32 = 0.1;
+/// Most that is saved of the energy that replaced models take, J.
+const MOST_SAVED_J: f32 = 5e-5;
 /// Largest change of the engagement a tick.
 const STEP: f32 = 1.0 / 256.0;
 
@@ -43,6 +55,8 @@ pub(crate) struct GeometricEnergy {
     round: Round,
     /// Result of the last whole round, if an energy moves the held part.
     found: Option<Model>,
+    /// Energy that replaced models took, less what others made, J.
+    saved_j: f32,
 }
 
 /// Sums of a round so far.
@@ -87,6 +101,8 @@ impl Sum {
 struct Model {
     center: Vec3,
     orientation: Quat,
+    /// Energy at that pose, J.
+    energy: f32,
     wrench: Wrench,
     stiffness: Stiffness,
     /// Energy of the deepest well, which gives the way's direction, for unit depth.
@@ -118,6 +134,11 @@ impl Stiffness {
         moved * self.across + self.way * (self.along_more * self.way.dot(moved))
     }
 
+    /// What its springs store, J.
+    fn energy(&self, moved: Vec3, turned: Vec3) -> f32 {
+        0.5 * (moved.dot(self.times(moved)) + self.turning * turned.length_squared())
+    }
+
     fn scaled(&self, by: f32) -> Self {
         Self {
             across: self.across * by,
@@ -132,6 +153,7 @@ impl Model {
     const NONE: Self = Self {
         center: Vec3::ZERO,
         orientation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+        energy: 0.0,
         wrench: Wrench::ZERO,
         stiffness: Stiffness::ZERO,
         deepest: 0.0,
@@ -147,18 +169,30 @@ impl Model {
         )
     }
 
-    /// Drags the pose of the round along where the model's springs exceed 1 N, or the torque `length` (m) times that.
+    /// m(δ) at the held part's pose, J.
+    fn energy(&self, grabbed: &Grabbed) -> f32 {
+        let (moved, turned) = self.moved(grabbed);
+        let linear = self.wrench.force.dot(moved) + self.wrench.torque.dot(turned);
+        self.energy - linear + self.stiffness.energy(moved, turned)
+    }
+
+    /// Drags the pose of the round along where the model's springs exceed 1 N, or the torque `length` (m) times that. What it stores stays the same.
     fn drag(&mut self, grabbed: &Grabbed, length_m: f32) {
         let (moved, turned) = self.moved(grabbed);
         let force = length(self.stiffness.times(moved));
+        let torque = self.stiffness.turning * length(turned);
+        if force <= 1.0 && torque <= length_m {
+            return;
+        }
+        let stored = self.energy(grabbed);
         if force > 1.0 {
             self.center += moved * (1.0 - 1.0 / force);
         }
-        let torque = self.stiffness.turning * length(turned);
         if torque > length_m {
             let by = turned * (1.0 - length_m / torque);
             self.orientation = crate::math::rotation::exp(by) * self.orientation;
         }
+        self.energy += stored - self.energy(grabbed);
     }
 
     /// Adds an energy whose charges are all summed. Where none of them is in the lattice the energy is zero all about, and needs no majoriser: its
@@ -170,6 +204,7 @@ impl Model {
         let record = energy.record;
         // Joules of depth for a largest force of 1 N.
         let depth_j = 1.0 / record.largest_force;
+        self.energy += sum.energy * depth_j;
         let force = sum.force * (depth_j / record.step);
         self.wrench.force += fixed.transform_vector(force);
         self.wrench.torque += fixed.transform_vector(sum.torque * depth_j);
@@ -209,6 +244,8 @@ pub(crate) struct EnergySituation<'a, 'i> {
     pub period_s: f32,
     /// L, m.
     pub length: f32,
+    /// Whether the last tick was busy with contact.
+    pub busy: bool,
 }
 
 impl GeometricEnergy {
@@ -230,6 +267,7 @@ impl GeometricEnergy {
                 acts: false,
             },
             found: None,
+            saved_j: 0.0,
         }
     }
 
@@ -238,6 +276,16 @@ impl GeometricEnergy {
         self.engagement = 0.0;
         self.round.running = false;
         self.found = None;
+        self.saved_j = 0.0;
+    }
+
+    /// What it takes of a tick's budget, field queries; in a busy tick as in a calm one, since a budget that changed with it would make the next tick calm.
+    pub fn cost(&self) -> u32 {
+        if self.round.running || self.found.is_some() {
+            energy_cost(CHARGES_PER_TICK)
+        } else {
+            0
+        }
     }
 
     /// 0 to 1.
@@ -252,7 +300,9 @@ impl GeometricEnergy {
             self.clear();
             return None;
         }
-        self.sum(at);
+        if let Some(next) = self.sum(at) {
+            self.replace(next, at.grabbed, self.engagement * settings.geometric_force_n);
+        }
         // Not before there is a model: none of the force arrives at once, and without an energy of the held part nothing guides.
         self.engagement = if is_on && self.found.is_some() {
             smaller(self.engagement + STEP, 1.0)
@@ -277,8 +327,27 @@ impl GeometricEnergy {
         })
     }
 
-    /// Continues the round by a tick's charges; a whole one becomes the model in force.
-    fn sum(&mut self, at: &EnergySituation<'_, '_>) {
+    /// Puts the model of a whole round in force, for a largest force of `largest_n`, and accounts for it.
+    fn replace(&mut self, next: Option<Model>, grabbed: &Grabbed, largest_n: f32) {
+        let last = core::mem::replace(&mut self.found, next);
+        let Some(next) = &mut self.found else {
+            return;
+        };
+        let whole = next.stiffness;
+        next.stiffness = whole.scaled(LOOSE_SHARE);
+        let Some(stored) = last.map(|last| last.energy(grabbed)) else {
+            return;
+        };
+        let mut saved_j = self.saved_j + (stored - next.energy(grabbed)) * largest_n;
+        if saved_j < 0.0 {
+            next.stiffness = whole;
+            saved_j = self.saved_j + (stored - next.energy(grabbed)) * largest_n;
+        }
+        self.saved_j = smaller(saved_j, MOST_SAVED_J);
+    }
+
+    /// Continues the round by a tick's charges; returns the model of a whole one, which is `None` where no energy moves the held part.
+    fn sum(&mut self, at: &EnergySituation<'_, '_>) -> Option<Option<Model>> {
         let round = &mut self.round;
         let grabbed = at.grabbed;
         if !round.running {
@@ -297,12 +366,15 @@ impl GeometricEnergy {
                 acts: false,
             };
         }
-        let mut left = CHARGES_PER_TICK;
+        let mut left = if at.busy {
+            CHARGES_PER_BUSY_TICK
+        } else {
+            CHARGES_PER_TICK
+        };
         while left > 0 {
             let Some(energy) = at.scene.energy(round.energy as usize) else {
-                self.found = round.acts.then_some(round.model);
                 round.running = false;
-                return;
+                return Some(round.acts.then_some(round.model));
             };
             let fixed = at.parts.get(usize::from(energy.record.fixed));
             let acts = energy.record.moving == grabbed.part;
@@ -327,10 +399,13 @@ impl GeometricEnergy {
                 left = left.saturating_sub(1);
             }
         }
+        None
     }
 }
 
 impl Round {
+    /// Adds some of an energy's charges. Not inlined: its loop needs all registers.
+    #[inline(never)]
     fn sum_charges(
         &mut self,
         energy: &Energy<'_>,
@@ -344,7 +419,7 @@ impl Round {
         let origin =
             (back * (self.object.position - fixed.position) - Vec3::from_array(record.origin)) * per_step;
         let center = (back * (self.center - fixed.position) - Vec3::from_array(record.origin)) * per_step;
-        let sum = &mut self.sum;
+        let mut sum = self.sum;
         for charge in charges {
             let place = to_steps * Vec3::from_array(charge.at) + origin;
             let Some((value, slope)) = energy.at(place.to_array(), charge.charge) else {
@@ -356,6 +431,7 @@ impl Round {
             sum.force += force;
             sum.torque += (place - center).cross(force);
         }
+        self.sum = sum;
     }
 }
 
@@ -415,9 +491,7 @@ impl ForceTerm for EnergyForce {
         let [x, y, z, a, b, c] = *x;
         let (moved, turned) = (Vec3::new(x, y, z) * h, Vec3::new(a, b, c) * (h / self.length));
         let linear = self.wrench.force.dot(moved) + self.wrench.torque.dot(turned);
-        let square =
-            moved.dot(self.stiffness.times(moved)) + self.stiffness.turning * turned.length_squared();
-        0.5 * square - linear
+        self.stiffness.energy(moved, turned) - linear
     }
 }
 
