@@ -41,6 +41,8 @@ pub struct Way<'a> {
     pub length_mm: f64,
     /// Corners of the box, moving part's frame, about which it has charges, mm: that of its mating faces.
     pub mating: [DVec3; 2],
+    /// Unit vector out of the fit along the way, or along a screw's axis; fixed part's frame.
+    pub outward: DVec3,
     /// Pose of the moving part in the fixed one's frame (mm) at a travel from the fit, mm; defined beyond the length, too.
     pub pose: &'a (dyn Fn(f64) -> DAffine3 + Sync),
 }
@@ -49,12 +51,6 @@ impl Way<'_> {
     /// Travel from the fit to where the fit of the charges ends, mm.
     pub(crate) fn fitted_mm(&self) -> f64 {
         self.length_mm + FITTED_BEYOND_MM
-    }
-
-    /// Direction from the fit to the open, fixed part's frame.
-    pub(crate) fn outward(&self) -> DVec3 {
-        let [inward, outward] = [0.0, self.length_mm].map(|travel| (self.pose)(travel).translation);
-        (outward - inward).try_normalize().unwrap_or(DVec3::Z)
     }
 
     /// Depth of the wanted energy at a travel from the fit: 1 there, 0 from [`BEYOND_MM`] beyond the way's begin on.
@@ -103,7 +99,7 @@ impl BakedEnergy {
     pub fn minimum(&self, pose: &DAffine3) -> (f64, f64) {
         let way = DVec3::from_array(self.record.way.map(f64::from));
         let start = Start::new(*pose, way, pose.transform_point3(self.middle()));
-        let at = start.lowest(|pose| self.at(pose, DVec3::ZERO).energy, 4, FINE_MM);
+        let at = start.lowest(|pose| self.at(pose, DVec3::ZERO).energy, FINE_MM);
         (at[0].hypot(at[1]), at[2].hypot(at[3]) / TILT_ARM_MM)
     }
 

@@ -11,7 +11,7 @@ use crate::minimum::Start;
 
 /// Places of the way near which the least energy is looked for, how finely, mm, and the distance from the way that is no fault, mm.
 const PLACES: usize = 80;
-const FINE_MM: f64 = 5e-3;
+const FINE_MM: f64 = 1e-3;
 const NEAR_MM: f64 = 0.05;
 /// Steps back along the way, mm, and the share of the wanted rise that is enough there.
 const BACK_MM: f64 = 0.25;
@@ -27,7 +27,7 @@ const ASIDE_SHARE: f64 = 0.4;
 /// How far a fault may move the minimum, mm, in an energy that is good enough.
 pub(crate) const ENOUGH_MM: f64 = 0.1;
 /// Weights in the fit; near the way it is that over the depth there, down to the least one, so that a shallow minimum is as near as a deep one.
-const NEAR_WEIGHT: f64 = 210.0;
+const NEAR_WEIGHT: f64 = 120.0;
 const LEAST_HEIGHT: f64 = 0.25;
 const BACK_WEIGHT: f64 = 120.0;
 const ASIDE_WEIGHT: f64 = 100.0;
@@ -43,12 +43,12 @@ pub(crate) struct Fault {
     pub(crate) off_mm: f64,
 }
 
-/// The faults of an energy.
-pub(crate) fn faults(lattice: &Lattice, baked: &BakedEnergy, way: &Way<'_>) -> Vec<Fault> {
+/// The faults of an energy. `phase`, from 0 to 1, shifts the places of the way within their steps: minima vary from one place to the next.
+pub(crate) fn faults(lattice: &Lattice, baked: &BakedEnergy, way: &Way<'_>, phase: f64) -> Vec<Fault> {
     let felt = Felt::new(lattice, baked, way);
     let near = (0..2 * PLACES)
         .into_par_iter()
-        .filter_map(|i| felt.near(i / 2, [2, 4][i % 2]));
+        .flat_map_iter(|i| felt.near((i / 2) as f64 + phase, i % 2 == 1));
     let steps = (way.fitted_mm() / BACK_MM).floor() as usize;
     let back = (0..steps).into_par_iter().filter_map(|step| felt.back(step));
     let aside = (0..MOUTH_PLACES * DIRECTIONS)
@@ -91,22 +91,29 @@ impl<'a> Felt<'a> {
     /// A place of the way, with displacements from there.
     fn start(&self, travel: f64) -> Start {
         let on = (self.way.pose)(travel);
-        Start::new(on, self.way.outward(), on.transform_point3(self.middle))
+        Start::new(on, self.way.outward, on.transform_point3(self.middle))
     }
 
-    /// A least energy off the way near one of its places, by the first `free` displacements.
-    fn near(&self, place: usize, free: usize) -> Option<Fault> {
-        let travel = self.way.fitted_mm() * place as f64 / PLACES as f64;
+    /// A least energy off the way near one of its places, across it or with `tilt`; and the pose opposite, which else would be the next.
+    fn near(&self, place: f64, tilt: bool) -> impl Iterator<Item = Fault> {
+        let travel = self.way.fitted_mm() * place / PLACES as f64;
         let (start, height) = (self.start(travel), self.way.height(travel));
-        let x = start.lowest(|pose| self.energy(pose), free, FINE_MM);
+        let energy = |pose: &DAffine3| self.energy(pose);
+        let x = if tilt {
+            start.lowest(energy, FINE_MM)
+        } else {
+            start.lowest_across(energy, FINE_MM)
+        };
         let off_mm = x[0].hypot(x[1]).max(x[2].hypot(x[3]));
-        (off_mm > NEAR_MM).then(|| Fault {
-            from: (self.way.pose)(travel),
+        let from = (self.way.pose)(travel);
+        let sides = [x, x.map(|x| -x)].map(|x| Fault {
+            from,
             to: start.displaced(&x),
             rise: height * rise(off_mm / WIDTH_MM),
             weight: NEAR_WEIGHT / height.max(LEAST_HEIGHT),
             off_mm,
-        })
+        });
+        sides.into_iter().filter(move |_| off_mm > NEAR_MM)
     }
 
     /// Too little rise over a step back along the way.

@@ -70,7 +70,7 @@ pub(crate) fn lattice(
         origin: (low * M_PER_MM).as_vec3().to_array(),
         step: (step * M_PER_MM) as f32,
         size: size.map(|n| n as u16),
-        way: way.outward().as_vec3().to_array(),
+        way: way.outward.as_vec3().to_array(),
         // Until it is known.
         largest_force: 1.0,
         ..EnergyRecord::default()

@@ -26,6 +26,7 @@ pub fn of_fit(model: &CadModel, moving: usize, against: usize, fit: &Fit) -> Opt
     let way = Way {
         length_mm: path.length_mm,
         mating,
+        outward: to_fixed.transform_vector3(-path.direction).normalize(),
         pose: &|travel| to_fixed * placement(path, &fit.placement, travel),
     };
     bake(&density(moving), &density(fixed_shape), &way)
