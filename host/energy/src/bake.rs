@@ -22,7 +22,7 @@ const TURN_ABOUT: DVec3 = DVec3::new(1.0, 2.0, 3.0);
 
 /// Makes the energy of a moving part in a fixed one's density along a way. `None` where the two have no density for each other.
 ///
-/// Where a minimum is, a few hundred places leave to chance: where one set has minima off the way another is tried, and the better one kept. Cost: 2 to 10 s on
+/// Where a minimum is, a few hundred places leave to chance: where one set has minima off the way another is tried, and the better one kept. Cost: 3 to 20 s on
 /// two cores, most of it looking for minima.
 pub fn bake(moving: &Density, fixed: &Density, way: &Way<'_>) -> Option<BakedEnergy> {
     let zone = zone(moving, way.mating);

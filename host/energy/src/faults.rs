@@ -27,7 +27,7 @@ const ASIDE_SHARE: f64 = 0.4;
 /// How far a fault may move the minimum, mm, in an energy that is good enough.
 pub(crate) const ENOUGH_MM: f64 = 0.1;
 /// Weights in the fit; near the way it is that over the depth there, down to the least one, so that a shallow minimum is as near as a deep one.
-const NEAR_WEIGHT: f64 = 120.0;
+const NEAR_WEIGHT: f64 = 170.0;
 const LEAST_HEIGHT: f64 = 0.25;
 const BACK_WEIGHT: f64 = 120.0;
 const ASIDE_WEIGHT: f64 = 100.0;
@@ -46,9 +46,14 @@ pub(crate) struct Fault {
 /// The faults of an energy. `phase`, from 0 to 1, shifts the places of the way within their steps: minima vary from one place to the next.
 pub(crate) fn faults(lattice: &Lattice, baked: &BakedEnergy, way: &Way<'_>, phase: f64) -> Vec<Fault> {
     let felt = Felt::new(lattice, baked, way);
-    let near = (0..2 * PLACES)
-        .into_par_iter()
-        .flat_map_iter(|i| felt.near((i / 2) as f64 + phase, i % 2 == 1));
+    // The fit itself in every round.
+    let near = (0..2 * (PLACES + 1)).into_par_iter().flat_map_iter(|i| {
+        let place = match i / 2 {
+            0 => 0.0,
+            n => (n - 1) as f64 + phase,
+        };
+        felt.near(place, i % 2 == 1)
+    });
     let steps = (way.fitted_mm() / BACK_MM).floor() as usize;
     let back = (0..steps).into_par_iter().filter_map(|step| felt.back(step));
     let aside = (0..MOUTH_PLACES * DIRECTIONS)

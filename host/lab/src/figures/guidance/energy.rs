@@ -262,7 +262,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     }
     // Each kind once, in the quick form the first ones: pairs on which the weights of the fit were chosen, and pairs that were not looked at before.
     let count = if plan.quick { 2 } else { KINDS };
-    for (first, which) in [(2, "random"), (20, "other random")] {
+    for (first, which) in [(2, "random"), (30, "other random")] {
         let pairs = trials(count, |index| {
             Subject::random(first * KINDS as u64 + index as u64)
         })?;
