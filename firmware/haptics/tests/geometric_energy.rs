@@ -236,11 +236,18 @@ fn the_last_whole_round_acts_and_the_next_one_does_not_jump() {
                 continue;
             };
             let object = frame_of(&out.object);
-            let by = fixed().1.conjugate() * (object.0 - poses[began].0.0);
-            let pull = fixed().1 * LARGE.pull(by, DVec3::ZERO).0 * depth;
-            assert!(pull.length() < 1.0, "dragged along");
-            // With the whole stiffness or the share of it that acts while energy is saved.
-            let [whole, loose] = [1.0, LOOSE_SHARE].map(|by| (poses[began].1 - pull * by - force).length());
+            let pull = |to: DVec3, from: DVec3| {
+                fixed().1 * LARGE.pull(fixed().1.conjugate() * (to - from), DVec3::ZERO).0 * depth
+            };
+            let (start, now) = (poses[began].0.0, object.0);
+            assert!(pull(now, start).length() < 1.0, "dragged along");
+            // With a share of the stiffness while energy is saved; else with the whole of it from the pose at which the round ended.
+            let ended = poses[began + ROUND as usize - 1].0.0;
+            let models = [
+                pull(ended, start) * LOOSE_SHARE + pull(now, ended),
+                pull(now, start) * LOOSE_SHARE,
+            ];
+            let [whole, loose] = models.map(|pull| (poses[began].1 - pull - force).length());
             held_back[usize::from(loose < whole)] += 1;
             let off = whole.min(loose);
             // What single precision puts into another cell has another slope: three charges of 304.

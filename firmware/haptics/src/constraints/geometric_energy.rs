@@ -13,8 +13,8 @@
 //! K is the writer's majoriser at that depth, or a share of it, [`LOOSE_SHARE`]. With the whole of it m(δ) ≥ E(X), and replacing one model by the next makes
 //! no energy, but for the length of a round the part is held back like by a damper. With the share a part moves freely, and a replacement may make energy. So
 //! each replacement is accounted for: what the model that ends stored at the part's pose, less what the next one stores there, is *saved*, up to
-//! [`MOST_SAVED_J`]. As long as something is saved the share acts, else the whole. What any sequence of rounds makes is therefore at most [`MOST_SAVED_J`] and
-//! the one replacement that overdrew.
+//! [`MOST_SAVED_J`]. As long as something is saved the share acts; a replacement that overdraws goes on about the part's pose with the whole, without a step of
+//! force or energy. A sequence of rounds makes more than [`MOST_SAVED_J`] only by the replacements that overdraw, so where the part is fast.
 //!
 //! The energy finds and does not hold: interior overlap is left to contact, and a fit that is to be held to micrometres to targets. Its method is chosen
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
@@ -176,6 +176,17 @@ impl Model {
         self.energy - linear + self.stiffness.energy(moved, turned)
     }
 
+    /// Goes on about the held part's pose with another stiffness: it pulls and stores the same there.
+    fn go_on_about(&mut self, grabbed: &Grabbed, stiffness: Stiffness) {
+        let (moved, turned) = self.moved(grabbed);
+        self.energy = self.energy(grabbed);
+        self.wrench.force -= self.stiffness.times(moved);
+        self.wrench.torque -= turned * self.stiffness.turning;
+        self.center = grabbed.center;
+        self.orientation = grabbed.orientation;
+        self.stiffness = stiffness;
+    }
+
     /// Drags the pose of the round along where the model's springs exceed 1 N, or the torque `length` (m) times that. What it stores stays the same.
     fn drag(&mut self, grabbed: &Grabbed, length_m: f32) {
         let (moved, turned) = self.moved(grabbed);
@@ -335,13 +346,12 @@ impl GeometricEnergy {
         };
         let whole = next.stiffness;
         next.stiffness = whole.scaled(LOOSE_SHARE);
-        let Some(stored) = last.map(|last| last.energy(grabbed)) else {
+        let Some(last) = last else {
             return;
         };
-        let mut saved_j = self.saved_j + (stored - next.energy(grabbed)) * largest_n;
+        let saved_j = self.saved_j + (last.energy(grabbed) - next.energy(grabbed)) * largest_n;
         if saved_j < 0.0 {
-            next.stiffness = whole;
-            saved_j = self.saved_j + (stored - next.energy(grabbed)) * largest_n;
+            next.go_on_about(grabbed, whole);
         }
         self.saved_j = smaller(saved_j, MOST_SAVED_J);
     }
