@@ -50,7 +50,8 @@ pub(crate) struct ContactMemory {
     pub decimation: Decimation,
     /// Number of contacts that pushed in the last tick.
     pub pushing: u16,
-    /// Number of pairs of faces by which its contacts were gathered.
+    /// Touching face pairs as last gathered while an energy acts, and how many there were before the deepest were kept.
+    pub pairs: FacePairs,
     pub face_pairs: u16,
     /// Cost of its dearest leaf, eighths of a field query.
     pub dearest_leaf: u32,
@@ -143,6 +144,7 @@ impl ContactMemory {
             busy: false,
             decimation: Decimation::NEW,
             pushing: 0,
+            pairs: FacePairs::new(),
             face_pairs: 0,
             dearest_leaf: 0,
             shrunk_m: 0.0,
@@ -157,6 +159,7 @@ impl ContactMemory {
         self.busy = false;
         self.decimation = Decimation::NEW;
         self.pushing = 0;
+        self.pairs.clear();
         self.face_pairs = 0;
         self.dearest_leaf = 0;
         self.contacts.clear();
