@@ -52,9 +52,8 @@ pub(crate) struct Constraints<'a, R> {
     pub guided_share: f32,
     /// Number of saturating springs among the force terms.
     pub springs: usize,
-    /// What geometric energies take of the tick's budget, field queries, and what they take of one that is not busy.
+    /// What geometric energies take of the tick's budget, field queries.
     pub energies: u32,
-    pub calm_energies: u32,
 }
 
 impl<R> Constraints<'_, R> {
@@ -62,12 +61,6 @@ impl<R> Constraints<'_, R> {
     fn budget(&self, settings: &Settings) -> u32 {
         let whole = settings.contact.point_budget;
         whole - self.energies.min(whole / 2)
-    }
-
-    /// Field queries above which a tick is busy: half of a calm one's budget. With half of its own, a busy tick would make the next one calm.
-    fn busy_above(&self, settings: &Settings) -> u32 {
-        let whole = settings.contact.point_budget;
-        (whole - self.calm_energies.min(whole / 2)) / 2
     }
 }
 
@@ -196,7 +189,7 @@ fn search(
     let (stopped, used) = search.run(start, &mut memory.coherence, &mut memory.contacts, work);
     work.flags.insert_if(search.decimation > 0, Flags::BUDGET);
     memory.resume = stopped.unwrap_or(NodeCursor::FIRST);
-    memory.busy = used.all > constraints.busy_above(settings);
+    memory.busy = used.all > budget / 2;
     if used.dearest > 0 {
         memory.dearest_leaf = used.dearest;
     }

@@ -50,8 +50,7 @@ pub(crate) struct ContactMemory {
     pub decimation: Decimation,
     /// Number of contacts that pushed in the last tick.
     pub pushing: u16,
-    /// Touching face pairs as last gathered while an energy acts, and how many there were before the deepest were kept.
-    pub pairs: FacePairs,
+    /// Number of pairs of faces by which its contacts were gathered.
     pub face_pairs: u16,
     /// Cost of its dearest leaf, eighths of a field query.
     pub dearest_leaf: u32,
@@ -144,7 +143,6 @@ impl ContactMemory {
             busy: false,
             decimation: Decimation::NEW,
             pushing: 0,
-            pairs: FacePairs::new(),
             face_pairs: 0,
             dearest_leaf: 0,
             shrunk_m: 0.0,
@@ -159,7 +157,6 @@ impl ContactMemory {
         self.busy = false;
         self.decimation = Decimation::NEW;
         self.pushing = 0;
-        self.pairs.clear();
         self.face_pairs = 0;
         self.dearest_leaf = 0;
         self.contacts.clear();

@@ -29,7 +29,7 @@ pub struct Output {
     pub object: Pose,
     /// Its twist at its centre of mass, world axes.
     pub object_twist: Twist,
-    /// Touching face pairs, deepest first. While a geometric energy acts, those at the beginning of its round, up to 13 ticks ago.
+    /// Touching face pairs, deepest first.
     pub pairs: FacePairs,
     /// State of the constraint targets.
     pub guidance: GuidanceState,

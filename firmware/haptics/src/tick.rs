@@ -165,8 +165,7 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
         rules: &rules,
         guided_share: hand.targets.share(&situation),
         springs: springs.len(),
-        energies: hand.energy.cost(hand.contact.busy, hand.contact.face_pairs),
-        calm_energies: hand.energy.calm_cost(),
+        energies: hand.energy.cost(hand.contact.face_pairs),
     };
     let motion = (&step, terms, &free);
     let solution = contact_step(
@@ -316,14 +315,7 @@ fn react(
         guidance: moved.guidance,
         work: Work::default(),
     };
-    if !hand.energy.gathers_faces() {
-        out.pairs.clone_from(&hand.contact.pairs);
-    } else {
-        hand.contact.face_pairs = touching_faces(contacts, &scenery, &mut out.pairs);
-        if hand.energy.acts() {
-            hand.contact.pairs.clone_from(&out.pairs);
-        }
-    }
+    hand.contact.face_pairs = touching_faces(contacts, &scenery, &mut out.pairs);
     (hand.contact.coherence).travelled(period_s * point_speed(grabbed.twist, grabbed.body.reach));
     hand.grabbed = Some(grabbed);
     out.handle = hand.limited(wanted, input, settings, &mut work.flags);

@@ -21,8 +21,7 @@
 //!
 //! Source: M. Behandish, H. Ilieş, *Peg-in-Hole Revisited: A Generic Force Model for Haptic Assembly*, JCISE 15(4), 2015, eqs. 11 to 13; rounds,
 //! majoriser and account are ours. Cost on a Cortex-M7: 230 instructions for each charge of the tick that is in the lattice and 1,300 more; none with another
-//! method. A tick after one that is busy with contact takes [`CHARGES_PER_BUSY_TICK`] of them. The budget of the search for contacts is charged for them. The
-//! touching face pairs for telemetry, which cost as much, are gathered at the beginning of a round; a busy tick then takes no charges.
+//! method. A tick after one that is busy with contact takes [`CHARGES_PER_BUSY_TICK`] of them. The budget of the search for contacts is charged for them.
 
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::{ENERGY_DEPTHS, Energy, SceneImage};
@@ -65,8 +64,6 @@ pub(crate) struct GeometricEnergy {
 struct Round {
     /// Whether it has begun; else the next tick begins it.
     running: bool,
-    /// Whether this tick began it, and, if the last one was busy with contact, summed nothing.
-    begins: bool,
     object: Pose,
     center: Vec3,
     /// Number of the energy, and of its charge, that comes next.
@@ -239,15 +236,6 @@ impl Model {
     }
 }
 
-/// Charges summed in a tick, by whether the last one was busy with contact.
-fn charges_per_tick(busy: bool) -> u16 {
-    if busy {
-        CHARGES_PER_BUSY_TICK
-    } else {
-        CHARGES_PER_TICK
-    }
-}
-
 /// Entry of a table over depths from 0 to 1, linear between entries.
 fn interpolated(row: &[f32; ENERGY_DEPTHS], depth: f32) -> f32 {
     let last = ENERGY_DEPTHS - 1;
@@ -278,7 +266,6 @@ impl GeometricEnergy {
             engagement: 0.0,
             round: Round {
                 running: false,
-                begins: false,
                 object: Pose {
                     position: Vec3::ZERO,
                     orientation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
@@ -299,42 +286,18 @@ impl GeometricEnergy {
     pub fn clear(&mut self) {
         self.engagement = 0.0;
         self.round.running = false;
-        self.round.begins = false;
         self.found = None;
         self.saved_j = 0.0;
     }
 
-    /// What it takes of the tick's budget, field queries, with what gathering `face_pairs` takes in it: a tick with an energy has nothing to spare.
-    pub fn cost(&self, busy: bool, face_pairs: u16) -> u32 {
-        if !self.acts() {
-            return 0;
-        }
-        let charges = if busy && self.round.begins {
-            0
-        } else {
-            charges_per_tick(busy)
-        };
-        let gathered = if self.gathers_faces() { face_pairs } else { 0 };
-        energy_cost(charges) + face_pairs_cost(gathered)
-    }
-
-    /// As [`Self::cost`], of a tick that is not busy and sums charges.
-    pub fn calm_cost(&self) -> u32 {
-        if self.acts() {
-            energy_cost(CHARGES_PER_TICK)
+    /// What it takes of a tick's budget, field queries; in a busy tick as in a calm one, since a budget that changed with it would make the next tick calm.
+    /// With it, since nothing is to spare, what it takes to gather as many `face_pairs` as in the last tick.
+    pub fn cost(&self, face_pairs: u16) -> u32 {
+        if self.round.running || self.found.is_some() {
+            energy_cost(CHARGES_PER_TICK) + face_pairs_cost(face_pairs)
         } else {
             0
         }
-    }
-
-    /// Whether a round runs, or a model acts.
-    pub fn acts(&self) -> bool {
-        self.round.running || self.found.is_some()
-    }
-
-    /// Whether this tick gathers its touching face pairs. While there is a model only ticks that begin a round do: busy ones among them sum nothing.
-    pub fn gathers_faces(&self) -> bool {
-        self.found.is_none() || self.round.begins
     }
 
     /// 0 to 1.
@@ -401,7 +364,6 @@ impl GeometricEnergy {
         if !round.running {
             *round = Round {
                 running: true,
-                begins: true,
                 object: grabbed.pose(),
                 center: grabbed.center,
                 energy: 0,
@@ -414,13 +376,12 @@ impl GeometricEnergy {
                 },
                 acts: false,
             };
-            if at.busy {
-                return None;
-            }
-        } else {
-            round.begins = false;
         }
-        let mut left = charges_per_tick(at.busy);
+        let mut left = if at.busy {
+            CHARGES_PER_BUSY_TICK
+        } else {
+            CHARGES_PER_TICK
+        };
         while left > 0 {
             let Some(energy) = at.scene.energy(round.energy as usize) else {
                 round.running = false;
