@@ -170,7 +170,6 @@ mod tests {
             start: NodeCursor::FIRST,
             stopped: None,
             used: Used {
-                dearest: 0,
                 all,
                 point_work: 3 * all / 4,
             },
@@ -211,11 +210,7 @@ mod tests {
         let mut o = Decimation::NEW;
         let mut play = |point_work| {
             for _ in 0..1000 {
-                let used = Used {
-                    all: 500,
-                    point_work,
-                    dearest: 0,
-                };
+                let used = Used { all: 500, point_work };
                 o.update(&Searched {
                     used,
                     ..stopped(5, 40)
@@ -281,11 +276,7 @@ mod tests {
         }
         assert_eq!(o.level(), MAX_DECIMATION);
         let spent_on_points = |point_work| {
-            let used = Used {
-                all: 550,
-                point_work,
-                dearest: 0,
-            };
+            let used = Used { all: 550, point_work };
             Searched {
                 used,
                 ..stopped(5, 40)

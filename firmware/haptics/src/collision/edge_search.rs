@@ -132,12 +132,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.open(key, node.skip);
                 continue;
             }
-            if self.is_short() {
-                return Some(here);
-            }
             // As long as its bound holds, none of its pieces can touch.
             let holds = distance > self.search.margin || matches!(known, Known::Far(_));
-            let before = self.spent;
             let travel = if holds {
                 self.travel_to_edges(pair, node)
             } else {
@@ -145,7 +141,6 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 let lasting = known == Known::Nothing;
                 self.edge_leaf(pair, here, node, lasting)
             };
-            self.evaluated(before);
             let distance = larger(distance, travel);
             ancestors.note(if distance > self.search.margin {
                 self.coherence.set_distance(key, distance)

@@ -58,9 +58,7 @@ impl FaceCache {
     }
 
     pub fn clear(&mut self) {
-        for slot in &mut self.slots {
-            slot.until_nm = 0;
-        }
+        self.slots.fill(Slot::EMPTY);
     }
 
     /// Cached face of the selected points of a leaf at the given travel.
