@@ -13,8 +13,8 @@
 //! K is the writer's majoriser at that depth, or a share of it, [`LOOSE_SHARE`]. With the whole of it m(δ) ≥ E(X), and replacing one model by the next makes
 //! no energy, but for the length of a round the part is held back like by a damper. With the share a part moves freely, and a replacement may make energy. So
 //! each replacement is accounted for: what the model that ends stored at the part's pose, less what the next one stores there, is *saved*, up to
-//! [`MOST_SAVED_J`]. As long as something is saved the share acts; a replacement that overdraws goes on about the part's pose with the whole, without a step of
-//! force or energy. A sequence of rounds makes more than [`MOST_SAVED_J`] only by the replacements that overdraw, so where the part is fast.
+//! [`MOST_SAVED_J`]. As long as something is saved the share acts; a replacement that overdraws is expanded anew about the part's pose, with the whole and the same
+//! force and energy there. A sequence of rounds makes more than [`MOST_SAVED_J`] only by the replacements that overdraw, so where the part is fast.
 //!
 //! The energy finds and does not hold: interior overlap is left to contact, and a fit that is to be held to micrometres to targets. Its method is chosen
 //! instead of theirs. What it stores was supplied by nobody; the operator is kept from it as from that of targets, by [`crate::passivity::energy_bound`].
@@ -176,7 +176,7 @@ impl Model {
         self.energy - linear + self.stiffness.energy(moved, turned)
     }
 
-    /// Goes on about the held part's pose with another stiffness: it pulls and stores the same there.
+    /// Expands the model anew about the held part's pose, with another stiffness: force, torque and energy at that pose stay the same.
     fn go_on_about(&mut self, grabbed: &Grabbed, stiffness: Stiffness) {
         let (moved, turned) = self.moved(grabbed);
         self.energy = self.energy(grabbed);
