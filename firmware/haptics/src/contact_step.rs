@@ -169,7 +169,7 @@ fn search(
         swing: reach.margin / (grabbed.body.reach * grabbed.body.reach),
         inverse_length: 1.0 / step.length,
         busy: memory.busy,
-        decimation: memory.decimation.level(),
+        decimation: memory.decimation,
         budget,
         // Reserve at least half of the budget for contact search, however many targets are active.
         reserved: reserved.min(budget / 2),
@@ -179,7 +179,7 @@ fn search(
     };
     let start = memory.resume;
     let (stopped, used) = search.run(start, &mut memory.coherence, &mut memory.contacts, work);
-    work.flags.insert_if(search.decimation > 0, Flags::BUDGET);
+    work.flags.insert_if(search.decimation.level() > 0, Flags::BUDGET);
     memory.resume = stopped.unwrap_or(NodeCursor::FIRST);
     memory.busy = used.all > budget / 2;
     let touching = memory.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;

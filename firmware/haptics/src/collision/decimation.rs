@@ -1,11 +1,16 @@
 //! Decimation of near points while the work exceeds the budget.
 //!
-//! When the budget runs out, contacts that pushed in leaves not reached are carried over, and the next tick resumes where this one stopped. That
+//! When the budget runs out, contacts in leaves not reached that pushed, or may now, are carried over, and the next tick resumes where this one stopped. That
 //! suffices where two ticks complete a round, and for the first pass over everything after a grab. Where they do not, every second near point is
 //! decimated, then, a round later, every second of the rest, until two ticks suffice. Whole leaves are decimated only where points are most of the
 //! work even at an eighth of them: a face may have no more than one leaf. Otherwise the ticks continue to complete rounds as they can. Contacts
 //! count as points, those carried over, too. The level falls again, doubling the points each time, once that would not make it rise, for a quarter
 //! of a second: contacts that come and go are felt more than fewer of them.
+//!
+//! Points of edges and corners stay: of a face's inside one point stands for its neighbours, but a prism has nothing else that could touch, and without
+//! them went millimetres into its hole's walls.
+
+use mortise_protocol::image::{NO_FACE, PointRecord};
 
 use crate::collision::contact::MAX_CONTACTS;
 use crate::collision::cost::Used;
@@ -28,17 +33,6 @@ const NINTHS: u32 = 8;
 pub(crate) const LEAF_DECIMATION: u8 = 3;
 /// Points of a leaf that are queried, by level.
 const KEPT_POINTS: [Points; LEAF_DECIMATION as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
-
-/// Points of a leaf that are queried. Above [`LEAF_DECIMATION`] whole leaves are decimated, evenly too.
-#[inline]
-pub(crate) fn mask(decimation: u8, first_point: u32) -> Points {
-    let leaves = (1u32 << decimation.saturating_sub(LEAF_DECIMATION)) - 1;
-    if (first_point >> LEAF_DECIMATION) & leaves != 0 {
-        0
-    } else {
-        KEPT_POINTS[usize::from(decimation.min(LEAF_DECIMATION))]
-    }
-}
 
 /// Decimation level and the history that decides its changes.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +72,34 @@ impl Decimation {
     /// Decimation level: only each 2ⁿth near point is to be queried.
     pub fn level(&self) -> u8 {
         self.level
+    }
+
+    /// Which of a leaf's `points` are queried, [`ALL`] if all are. Above [`LEAF_DECIMATION`] whole leaves are decimated, evenly too.
+    #[inline]
+    pub fn mask(&self, first_point: u32, points: &[PointRecord]) -> Points {
+        if self.level == 0 {
+            return ALL;
+        }
+        let leaves = (1u32 << self.level.saturating_sub(LEAF_DECIMATION)) - 1;
+        let evenly = if (first_point >> LEAF_DECIMATION) & leaves != 0 {
+            0
+        } else {
+            KEPT_POINTS[usize::from(self.level.min(LEAF_DECIMATION))]
+        };
+        let mut kept = evenly;
+        let mut which: Points = 1;
+        for point in points {
+            if point.edge_face != NO_FACE {
+                kept |= which;
+            }
+            which <<= 1;
+        }
+        // Bits past the last point count as kept.
+        if kept | !which.wrapping_sub(1) == ALL {
+            ALL
+        } else {
+            kept
+        }
     }
 
     /// Adapts the level to the outcome of a search.
@@ -308,6 +330,31 @@ mod tests {
                 prop_assert!(o.level() <= MAX_DECIMATION);
                 let fits = 4 * ((touching + lost) >> (o.level() - before.min(o.level()))) <= 3 * MAX_CONTACTS as u32;
                 prop_assert!(lost == 0 || fits || o.level() == MAX_DECIMATION);
+            }
+        }
+    }
+
+    /// At every level points of edges stay, and of those inside of faces the same ones as without them.
+    #[test]
+    fn points_of_edges_stay() {
+        let inside = PointRecord {
+            edge_face: NO_FACE,
+            ..PointRecord::default()
+        };
+        let edge = PointRecord::default();
+        let mut decimation = Decimation::NEW;
+        assert_eq!(decimation.mask(0, &[inside; 8]), ALL);
+        for level in 1..=MAX_DECIMATION {
+            decimation.level = level;
+            for first in [0, 8, 64] {
+                let evenly = decimation.mask(first, &[inside; 8]);
+                assert_ne!(evenly, ALL);
+                assert_eq!(decimation.mask(first, &[edge; 8]), ALL);
+                assert_eq!(decimation.mask(first, &[edge; 20]), ALL);
+                let [mut first_two, mut all_but_one] = [[inside; 8], [edge; 8]];
+                (first_two[0], first_two[1], all_but_one[7]) = (edge, edge, inside);
+                assert_eq!(decimation.mask(first, &first_two), evenly | 0b11);
+                assert_eq!(decimation.mask(first, &all_but_one) & 0xff, 0x7f | evenly & 0xff);
             }
         }
     }

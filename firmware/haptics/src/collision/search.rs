@@ -5,7 +5,7 @@
 //! and skip every sphere whose distance, by the field at its centre, exceeds the margin.
 //!
 //! When the budget runs out, work is dropped in this order. First, the step gets only as many solves as the budget has left, four at least. Second,
-//! contacts that pushed in leaves not reached are carried over, their gaps advanced by the last motion, and the next tick resumes where this one
+//! contacts in leaves not reached that pushed, or may now, are carried over, their gaps advanced by the last motion, and the next tick resumes where this one
 //! stopped, round and round. Third, when two ticks do not complete a round (the ticks after a grab excepted), points are decimated evenly where
 //! points are the bulk of the work: each second, fourth or eighth near point is queried where points take a quarter of the budget; where they still
 //! take half of it, whole leaves are decimated, down to each 128th point. The selection stays the same until the budget suffices again
@@ -25,7 +25,7 @@ use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
     ALLOWANCE, CANDIDATE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, PUSHING, Used,
 };
-use crate::collision::decimation::mask;
+use crate::collision::decimation::Decimation;
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, exact, exact_on_face, on_surface_of, with_allowance};
 use crate::collision::facing::faces_away;
@@ -78,7 +78,7 @@ pub(crate) struct Search<'s, 'i, R> {
     /// The last tick needed half of the budget or more.
     pub busy: bool,
     /// Only each 2ⁿth near point of a leaf is queried.
-    pub decimation: u8,
+    pub decimation: Decimation,
     /// Work budget of the tick, field queries.
     pub budget: u32,
     /// Part of the budget reserved for the step.
@@ -124,10 +124,11 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             .pairs(start, None)
             .or_else(|| traversal.pairs(NodeCursor::FIRST, Some(start)));
         let (spent, not_found, point_work) = (traversal.spent, traversal.expected, traversal.point_work);
-        let mut carried = 0;
+        let [mut carried, mut near] = [0; 2];
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET);
-            carried = contacts.carry(&self.motions[0], |leaf| {
+            let limit = |row: &[f32; 6]| self.slack + self.approach(row);
+            [carried, near] = contacts.carry(&self.motions[0], limit, |leaf| {
                 let visited = if start < stop {
                     start <= leaf && leaf < stop
                 } else {
@@ -138,8 +139,8 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         }
         let found = self.expected() - not_found;
         let used = Used {
-            all: (spent + PUSHING * carried - PUSHING * not_found) / LOOKUP,
-            point_work: (point_work + PUSHING * (found + carried)) / LOOKUP,
+            all: (spent + PUSHING * carried + CANDIDATE * near - PUSHING * not_found) / LOOKUP,
+            point_work: (point_work + PUSHING * (found + carried) + CANDIDATE * near) / LOOKUP,
         };
         (stop, used)
     }
@@ -354,8 +355,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.open(key, node.skip);
                 continue;
             }
-            let mask = mask(self.search.decimation, node.first_point);
             let points = node.points(pair.points);
+            let mask = self.search.decimation.mask(node.first_point, points);
             // Queried as seldom as the field is.
             if queried
                 && !pair.excluded.is_empty()

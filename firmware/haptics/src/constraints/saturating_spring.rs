@@ -169,7 +169,8 @@ impl SaturatingSpring {
             Law::Spring { stiffness, .. } => 0.5 * stiffness * squared,
             Law::Capped { stiffness, cap, .. } => {
                 let slack = cap / stiffness;
-                cap * (libm::sqrtf(slack * slack + squared) - slack)
+                // Without the difference of two numbers that are nearly equal.
+                cap * squared / (libm::sqrtf(slack * slack + squared) + slack)
             }
         }
     }

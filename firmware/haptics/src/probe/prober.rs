@@ -11,6 +11,7 @@ use mortise_protocol::image::{NO_FACE, SceneImage, Shape};
 
 use crate::collision::coherence::Coherence;
 use crate::collision::contact::{Contacts, Phase};
+use crate::collision::decimation::Decimation;
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::rules::NoRules;
@@ -155,7 +156,7 @@ fn resting_search<'s, 'i>(
         swing: 0.0,
         inverse_length: 1.0,
         busy: false,
-        decimation: 0,
+        decimation: Decimation::NEW,
         budget: u32::MAX,
         reserved: 0,
         carried: 0,

@@ -25,6 +25,8 @@ const ENERGY_INSTRUCTIONS: f64 = 20_000.0;
 pub(super) const TICK_INSTRUCTIONS: f64 = 120_000.0;
 /// Energy made, mJ.
 const MADE_MJ: f64 = 1.0;
+/// Deepest overlap under a careless hand, mm: as under a fast one.
+const CARELESS_OVERLAP_MM: f64 = 0.3;
 /// Heights above the mouth, mm.
 const ABOVE_MM: [f64; 3] = [1.0, 2.0, 5.0];
 /// Reach of the grid on which the least energy is sought above the mouth, mm, and the step that ends the search, mm.
@@ -449,7 +451,7 @@ fn cost(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     Ok(())
 }
 
-/// Energy made while a careless hand goes in and out.
+/// Energy made and overlap while a careless hand goes in and out.
 fn careless(subject: &Subject, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let seconds = if plan.quick { WANDER_QUICK_S } else { WANDER_S };
     let count = (seconds / RECORDING_S).round() as usize;
@@ -458,7 +460,12 @@ fn careless(subject: &Subject, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Res
         let recording = subject.followed.wander(&mut random, RECORDING_S, &SIM)?;
         let at_part = (subject.followed).made_by_energy_mj(&subject.energy, &recording.samples);
         let outcome = recording.outcome;
-        Ok([outcome.energy_given_mj, at_part, f64::from(outcome.missed_ticks)])
+        Ok([
+            outcome.energy_given_mj,
+            at_part,
+            outcome.penetration_mm,
+            f64::from(outcome.missed_ticks),
+        ])
     })?;
     let worst = |k: usize| seen.iter().map(|seen| seen[k]).fold(0.0, f64::max);
     let motions = (4.0 * RECORDING_S * count as f64).round() as usize;
@@ -480,7 +487,13 @@ fn careless(subject: &Subject, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Res
         "mJ",
         MADE_MJ,
     ));
-    out(Row::exactly(what("missed ticks"), worst(2), "ticks", 0.0));
+    out(Row::at_most(
+        what("deepest overlap by the exact surfaces"),
+        worst(2),
+        "mm",
+        CARELESS_OVERLAP_MM,
+    ));
+    out(Row::exactly(what("missed ticks"), worst(3), "ticks", 0.0));
     Ok(())
 }
 
@@ -512,6 +525,28 @@ mod tests {
             let error = subject.gradient_error(GRADIENTS);
             eprintln!("{section:?}: {error:.6} %");
             assert!(error < GRADIENT_PERCENT, "{section:?}: {error} %");
+        }
+    }
+
+    /// Prisms with many sides, whose search runs out of its budget in most ticks: with points of edges decimated, and contacts about to push forgotten, half of
+    /// these recordings overlapped by more than a millimetre.
+    #[test]
+    #[cfg_attr(debug_assertions, ignore = "bakes energies, minutes without optimisation")]
+    fn careless_motion_puts_no_prism_into_the_walls() {
+        for section in [Section::Circular, Section::Combined] {
+            let subject = Subject::of_section(section).expect("has an energy");
+            // Others than those of the page.
+            for seed in 1000..1008 {
+                let mut random = fastrand::Rng::with_seed(seed);
+                let recording = (subject.followed).wander(&mut random, RECORDING_S, &SIM);
+                let outcome = recording.expect("is played").outcome;
+                let (overlap, made) = (outcome.penetration_mm, outcome.energy_given_mj);
+                eprintln!("{section:?} {seed}: {overlap:.3} mm, {made:.4} mJ");
+                assert!(
+                    overlap < 0.6 && made < MADE_MJ,
+                    "{section:?} {seed}: {overlap} mm, {made} mJ"
+                );
+            }
         }
     }
 }
