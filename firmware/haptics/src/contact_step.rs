@@ -4,7 +4,7 @@ use glam::Vec3;
 use mortise_protocol::image::SceneImage;
 
 use crate::baseline::explicit;
-use crate::collision::cost::{LEAST_SOLVES, further_solve_cost, solve_cost, spring_cost};
+use crate::collision::cost::{CLEARED, LEAST_SOLVES, LOOKUP, further_solve_cost, solve_cost, spring_cost};
 use crate::collision::decimation::Searched;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::placement::Placed;
@@ -52,7 +52,7 @@ pub(crate) struct Constraints<'a, R> {
     pub guided_share: f32,
     /// Number of saturating springs among the force terms.
     pub springs: usize,
-    /// What geometric energies have taken of the tick's budget, field queries.
+    /// What geometric energies take of the tick's budget, field queries.
     pub energies: u32,
 }
 
@@ -148,7 +148,13 @@ fn search(
     let settings = given.settings;
     let (rules, springs) = (constraints.rules, constraints.springs);
     let budget = constraints.budget(settings);
-    let reserved = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + spring_cost(springs);
+    let cleared = if memory.coherence.renew() {
+        CLEARED / LOOKUP
+    } else {
+        0
+    };
+    let reserved =
+        cleared + solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + spring_cost(springs);
     let held_shape = given.scene.shape_of_part(usize::from(grabbed.part));
     let shrunk_m = memory.shrink(settings, &held_shape.field);
     let search = Search {
@@ -173,6 +179,8 @@ fn search(
         budget,
         // Reserve at least half of the budget for contact search, however many targets are active.
         reserved: reserved.min(budget / 2),
+        strict: constraints.energies > 0,
+        dearest_leaf: memory.dearest_leaf,
         carried: if memory.busy { u32::from(memory.pushing) } else { 0 },
         braking_m: given.braking_m(),
         rules,
@@ -182,6 +190,9 @@ fn search(
     work.flags.insert_if(search.decimation > 0, Flags::BUDGET);
     memory.resume = stopped.unwrap_or(NodeCursor::FIRST);
     memory.busy = used.all > budget / 2;
+    if used.dearest > 0 {
+        memory.dearest_leaf = used.dearest;
+    }
     let touching = memory.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
     memory.decimation.update(&Searched {
         start,

@@ -50,6 +50,10 @@ pub(crate) struct ContactMemory {
     pub decimation: Decimation,
     /// Number of contacts that pushed in the last tick.
     pub pushing: u16,
+    /// Number of pairs of faces by which its contacts were gathered.
+    pub face_pairs: u16,
+    /// Cost of its dearest leaf, eighths of a field query.
+    pub dearest_leaf: u32,
     /// How far points of the held part are moved inward before voxmaps are queried, m.
     pub shrunk_m: f32,
     /// Advancement bounds of tree nodes.
@@ -139,6 +143,8 @@ impl ContactMemory {
             busy: false,
             decimation: Decimation::NEW,
             pushing: 0,
+            face_pairs: 0,
+            dearest_leaf: 0,
             shrunk_m: 0.0,
             coherence: Coherence::new(),
             contacts: Contacts::new(),
@@ -151,6 +157,8 @@ impl ContactMemory {
         self.busy = false;
         self.decimation = Decimation::NEW;
         self.pushing = 0;
+        self.face_pairs = 0;
+        self.dearest_leaf = 0;
         self.contacts.clear();
         self.coherence.invalidate();
     }

@@ -165,7 +165,7 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
         rules: &rules,
         guided_share: hand.targets.share(&situation),
         springs: springs.len(),
-        energies: hand.energy.cost(),
+        energies: hand.energy.cost(hand.contact.face_pairs),
     };
     let motion = (&step, terms, &free);
     let solution = contact_step(
@@ -315,7 +315,7 @@ fn react(
         guidance: moved.guidance,
         work: Work::default(),
     };
-    touching_faces(contacts, &scenery, &mut out.pairs);
+    hand.contact.face_pairs = touching_faces(contacts, &scenery, &mut out.pairs);
     (hand.contact.coherence).travelled(period_s * point_speed(grabbed.twist, grabbed.body.reach));
     hand.grabbed = Some(grabbed);
     out.handle = hand.limited(wanted, input, settings, &mut work.flags);

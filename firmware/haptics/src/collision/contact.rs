@@ -214,16 +214,22 @@ impl Contacts {
         self.farthest2 = 0.0;
     }
 
-    /// Carries over contacts that pushed in the last tick and whose leaf was not visited: the object's `motion` since (scaled as the rows) updates
-    /// the gap, the normal stays. Returns their number.
-    pub fn carry(&mut self, motion: &[f32; 6], unvisited: impl Fn(NodeCursor) -> bool) -> u32 {
-        let mut carried = 0;
+    /// Carries over contacts whose leaf was not visited, if they pushed in the last tick or their gap is still below the `limit` of their row: the object's
+    /// `motion` since (scaled as the rows) updates the gap, the normal stays. Returns the number of those that pushed, and of the others.
+    pub fn carry(
+        &mut self,
+        motion: &[f32; 6],
+        limit: impl Fn(&[f32; 6]) -> f32,
+        unvisited: impl Fn(NodeCursor) -> bool,
+    ) -> [u32; 2] {
+        let mut carried = [0; 2];
         for i in 0..self.carried_len {
             let old = &self.lists[1 - self.current][i];
-            if old.phase == Phase::Free || !unvisited(old.leaf) {
+            let gap = old.gap + dot(&old.row, motion);
+            let is_free = old.phase == Phase::Free;
+            if !unvisited(old.leaf) || is_free && gap >= limit(&old.row) {
                 continue;
             }
-            let gap = old.gap + dot(&old.row, motion);
             let (reach_gap, arm2) = (old.reach_gap, old.arm.length_squared());
             if let Some(place) = self.place(gap, reach_gap, arm2) {
                 let [first, second] = &mut self.lists;
@@ -234,7 +240,7 @@ impl Contacts {
                 };
                 new[place] = old[i];
                 (new[place].gap, new[place].rate, new[place].phase) = (gap, 0.0, Phase::Free);
-                carried += 1;
+                carried[usize::from(is_free)] += 1;
             }
         }
         carried
@@ -403,27 +409,34 @@ mod tests {
         assert_eq!(contacts.lost(), 0);
     }
 
+    /// Of ten contacts, the first five pushed; the others are free, each 1 µm farther off than the last.
     #[test]
     fn carries_contacts_of_unvisited_leaves() {
         let mut contacts = Contacts::new();
-        for i in 0..10 {
-            let c = contacts.offer(-1e-6, 0.0, 0.0).unwrap();
+        for i in 0..10u16 {
+            let free = i >= 5;
+            let gap = if free { f32::from(i - 5) * 1e-6 } else { -1e-6 };
+            let c = contacts.offer(gap, 0.0, 0.0).unwrap();
             c.row = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-            c.phase = Phase::Parting;
+            c.phase = if free { Phase::Free } else { Phase::Parting };
             c.moving_face = i;
         }
+        let motion = [0.0, 0.0, 1e-6, 0.0, 0.0, 0.0];
         contacts.begin(true);
+        assert_eq!(contacts.carry(&motion, |_| 1.0, |_| false), [0, 0]);
         assert!(contacts.as_slice().is_empty());
-        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |_| false);
-        assert!(contacts.as_slice().is_empty());
-        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |leaf| leaf == NodeCursor::FIRST);
-        assert_eq!(contacts.as_slice().len(), 10);
+        // Free ones have 1 to 5 µm left.
+        assert_eq!(
+            contacts.carry(&motion, |_| 3.5e-6, |leaf| leaf == NodeCursor::FIRST),
+            [5, 3]
+        );
         for (i, c) in contacts.as_slice().iter().enumerate() {
             assert_eq!((usize::from(c.moving_face), c.phase), (i, Phase::Free));
-            assert_eq!(c.gap, -1e-6 + 1e-6);
+            let gap = if i < 5 { -1e-6 } else { (i - 5) as f32 * 1e-6 };
+            assert_eq!(c.gap, gap + 1e-6);
         }
         contacts.begin(false);
-        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |_| true);
+        assert_eq!(contacts.carry(&motion, |_| 1.0, |_| true), [0, 0]);
         assert!(contacts.as_slice().is_empty());
     }
 }

@@ -93,10 +93,16 @@ costs! {
     CIRCLE = 190;
     /// Bound of the travel until two circles cross.
     CIRCLE_PAIR = 67;
+    /// Step to the common perpendicular of two pieces of edges.
+    FEET_STEP = 95;
     /// Contact of two pieces of edges.
-    CROSSING = 380;
+    CROSSING = 285;
     /// Fixed cost of a search for the travel until a leaf's edges may touch.
     EDGE_TRAVEL = 760;
+    /// Clearing the table of advancement bounds.
+    CLEARED = 10_000;
+    /// Gathering the contacts of a pair of faces for telemetry.
+    FACE_PAIR = 1000;
     /// Setting up a target's spring and what depends on it, without its cost in a solve.
     SPRING = 1140;
     /// One solve without springs.
@@ -105,8 +111,8 @@ costs! {
     SPRING_IN_SOLVE = 475;
     /// Charge of a geometric energy.
     CHARGE = 230;
-    /// Model of the geometric energies, with what it adds to the solves.
-    MODEL = 2500;
+    /// Model of the geometric energies, with what it adds to four solves.
+    MODEL = 6000;
 }
 
 /// Reads of the field's bricks and cells that cost as much as one query, [`LOOKUP`].
@@ -127,6 +133,11 @@ pub(crate) fn energy_cost(charges: u16) -> u32 {
     (MODEL + CHARGE * u32::from(charges)) / LOOKUP
 }
 
+/// Cost of gathering contacts by this many pairs of faces, field queries.
+pub(crate) fn face_pairs_cost(pairs: u16) -> u32 {
+    FACE_PAIR * u32::from(pairs) / LOOKUP
+}
+
 /// Cost of one solve with this many springs, field queries.
 pub(crate) fn solve_cost(springs: usize) -> u32 {
     (SOLVE + SPRING_IN_SOLVE * springs as u32) / LOOKUP
@@ -143,6 +154,8 @@ pub(crate) struct Used {
     pub all: u32,
     /// Share spent on points rather than on the traversal.
     pub point_work: u32,
+    /// The dearest leaf, eighths of a field query; 0 if there was none.
+    pub dearest: u32,
 }
 
 #[cfg(test)]
@@ -179,13 +192,16 @@ mod tests {
                 ("EDGE_PAIR", 3),
                 ("CIRCLE", 8),
                 ("CIRCLE_PAIR", 3),
-                ("CROSSING", 16),
+                ("FEET_STEP", 4),
+                ("CROSSING", 12),
                 ("EDGE_TRAVEL", 32),
+                ("CLEARED", 421),
+                ("FACE_PAIR", 42),
                 ("SPRING", 48),
                 ("SOLVE", 64),
                 ("SPRING_IN_SOLVE", 20),
                 ("CHARGE", 10),
-                ("MODEL", 105),
+                ("MODEL", 253),
             ]),
             "{TABLE:#?}"
         );

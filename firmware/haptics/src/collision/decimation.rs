@@ -7,6 +7,8 @@
 //! count as points, those carried over, too. The level falls again, doubling the points each time, once that would not make it rise, for a quarter
 //! of a second: contacts that come and go are felt more than fewer of them.
 
+use mortise_protocol::image::{NO_FACE, PointRecord};
+
 use crate::collision::contact::MAX_CONTACTS;
 use crate::collision::cost::Used;
 use crate::collision::node_cursor::NodeCursor;
@@ -29,14 +31,32 @@ pub(crate) const LEAF_DECIMATION: u8 = 3;
 /// Points of a leaf that are queried, by level.
 const KEPT_POINTS: [Points; LEAF_DECIMATION as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
 
-/// Points of a leaf that are queried. Above [`LEAF_DECIMATION`] whole leaves are decimated, evenly too.
+/// Which of a leaf's `points` are queried, [`ALL`] if all are. Above [`LEAF_DECIMATION`] whole leaves are decimated, evenly too. Points of edges and corners
+/// stay: of a face's inside one point stands for its neighbours, but a prism has nothing else that could touch.
 #[inline]
-pub(crate) fn mask(decimation: u8, first_point: u32) -> Points {
+pub(crate) fn mask(decimation: u8, first_point: u32, points: &[PointRecord]) -> Points {
+    if decimation == 0 {
+        return ALL;
+    }
     let leaves = (1u32 << decimation.saturating_sub(LEAF_DECIMATION)) - 1;
-    if (first_point >> LEAF_DECIMATION) & leaves != 0 {
+    let evenly = if (first_point >> LEAF_DECIMATION) & leaves != 0 {
         0
     } else {
         KEPT_POINTS[usize::from(decimation.min(LEAF_DECIMATION))]
+    };
+    let mut kept = evenly;
+    let mut which: Points = 1;
+    for point in points {
+        if point.edge_face != NO_FACE {
+            kept |= which;
+        }
+        which <<= 1;
+    }
+    // Bits past the last point count as kept.
+    if kept | !which.wrapping_sub(1) == ALL {
+        ALL
+    } else {
+        kept
     }
 }
 
@@ -170,6 +190,7 @@ mod tests {
             start: NodeCursor::FIRST,
             stopped: None,
             used: Used {
+                dearest: 0,
                 all,
                 point_work: 3 * all / 4,
             },
@@ -210,7 +231,11 @@ mod tests {
         let mut o = Decimation::NEW;
         let mut play = |point_work| {
             for _ in 0..1000 {
-                let used = Used { all: 500, point_work };
+                let used = Used {
+                    all: 500,
+                    point_work,
+                    dearest: 0,
+                };
                 o.update(&Searched {
                     used,
                     ..stopped(5, 40)
@@ -276,7 +301,11 @@ mod tests {
         }
         assert_eq!(o.level(), MAX_DECIMATION);
         let spent_on_points = |point_work| {
-            let used = Used { all: 550, point_work };
+            let used = Used {
+                all: 550,
+                point_work,
+                dearest: 0,
+            };
             Searched {
                 used,
                 ..stopped(5, 40)

@@ -21,6 +21,10 @@ pub const LEAST_SINE: f32 = 0.005;
 const LEAST_SINE_OF_CURVES: f32 = 0.1;
 /// Sine of the angle by which a normal may lie outside of a cone: rounding, and the change of a face's normal along a piece.
 const CONE_SINE: f32 = 0.02;
+/// Wedges whose normals' sum is shorter than this share of their squares allows, 120° between them, are wide.
+const WIDE: f32 = 0.5;
+/// Sine by which cones are widened at most in [`may_face`]: with it, a normal at the border of one that is not wide points along its middle.
+const WIDEST_SINE: f32 = 0.45;
 /// How far past its ends a piece still counts, m: consecutive pieces leave no gap. Less than the clearance of any fit: at the corner of a hole the edges
 /// of a plug's end, prolonged by the clearance, cross those of the hole's rim.
 const PAST_END_M: f32 = 2e-6;
@@ -113,17 +117,17 @@ pub(crate) fn are_within(a: (Vec3, f32), b: (Vec3, f32), reach: f32) -> bool {
     (a.0 - b.0).length_squared() <= farthest * farthest
 }
 
-/// Whether `n` lies in the cone between the `normals` of the two faces at an edge of tangent `along`, within [`CONE_SINE`].
-fn in_cone(normals: [Vec3; 2], along: Vec3, n: Vec3) -> bool {
+/// Whether `n` lies in the cone between the `normals` of the two faces at an edge of tangent `along`, or outside of it by an angle of this `sine`.
+fn in_cone(normals: [Vec3; 2], along: Vec3, n: Vec3, sine: f32) -> bool {
     let unit = along * inverse_sqrt(along.length_squared());
     let across = |v: Vec3| {
         let flat = v - unit * v.dot(unit);
         flat * inverse_sqrt(flat.length_squared() + f32::MIN_POSITIVE)
     };
     let [a, b] = normals.map(across);
-    let sense = if a.cross(b).dot(unit) < 0.0 { -1.0 } else { 1.0 };
-    let (past_a, before_b) = (a.cross(n).dot(unit) * sense, n.cross(b).dot(unit) * sense);
-    past_a > -CONE_SINE && before_b > -CONE_SINE && n.dot(a + b) > 0.0
+    let turn = if a.cross(b).dot(unit) < 0.0 { -1.0 } else { 1.0 };
+    let (past_a, before_b) = (a.cross(n).dot(unit) * turn, n.cross(b).dot(unit) * turn);
+    past_a > -sine && before_b > -sine && n.dot(a + b) > 0.0
 }
 
 /// `above`/`below`, at least −1 and at most 1; `below` is not negative.
@@ -217,6 +221,30 @@ pub(crate) fn nearest(own: &Piece<'_>, other: &Piece<'_>) -> ([f32; 2], f32) {
     ([t, s], distance)
 }
 
+/// Whether two pieces may face each other, as [`crossing`] asks, after they turned against each other by up to `turn` rad; true for curved ones and for wide
+/// wedges, of which it is not known. `rotation`: as there.
+pub(crate) fn may_face(own: &Piece<'_>, other: &Piece<'_>, rotation: &Mat3, turn: f32) -> bool {
+    if !(own.straight && other.straight) {
+        return true;
+    }
+    let (d, e) = (own.half, other.half);
+    let across = d.cross(e);
+    let (squared, lengths2) = (across.length_squared(), own.half2 * other.half2);
+    // The common perpendicular turns by the angle between the edges over its sine, and the wedges turn too.
+    let sine =
+        CONE_SINE + turn + turn * inverse_sqrt(squared / (lengths2 + f32::MIN_POSITIVE) + f32::MIN_POSITIVE);
+    let cones = [own.normals(rotation), other.normals(&Mat3::IDENTITY)];
+    let is_wide =
+        |[a, b]: [Vec3; 2]| (a + b).length_squared() < WIDE * (a.length_squared() + b.length_squared());
+    if sine.is_nan() || sine >= WIDEST_SINE || cones.into_iter().any(is_wide) {
+        return true;
+    }
+    let unit = across * inverse_sqrt(squared);
+    [unit, -unit]
+        .into_iter()
+        .any(|n| in_cone(cones[1], e, n, sine) && in_cone(cones[0], d, -n, sine))
+}
+
 /// A contact of two edges, in the field's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crossing {
@@ -230,22 +258,29 @@ pub(crate) struct Crossing {
     pub sine: f32,
 }
 
-/// Contact of the piece `own`, turned by `rotation` into this frame, with the piece `other` of the field's part; `None` where they do not cross,
-/// hardly cross, or do not face each other. The search starts at the parameters `from`, those of the [`nearest`] points of their segments.
-pub(crate) fn crossing(
-    own: &Piece<'_>,
-    other: &Piece<'_>,
-    rotation: &Mat3,
-    from: [f32; 2],
-) -> Option<Crossing> {
-    let [mut t, mut s] = from;
-    let steps = if own.straight && other.straight { 1 } else { STEPS };
-    let least = if own.straight || other.straight {
+/// Steps that [`feet`] takes.
+#[inline]
+pub(crate) fn feet_steps(own: &Piece<'_>, other: &Piece<'_>) -> usize {
+    if own.straight && other.straight { 1 } else { STEPS }
+}
+
+/// Square of the sine of the smallest angle between two pieces that cross.
+#[inline]
+fn least_sine2(own: &Piece<'_>, other: &Piece<'_>) -> f32 {
+    if own.straight || other.straight {
         LEAST_SINE * LEAST_SINE
     } else {
         LEAST_SINE_OF_CURVES * LEAST_SINE_OF_CURVES
-    };
-    for _ in 0..steps {
+    }
+}
+
+/// Feet of the common perpendicular of two pieces, by their parameters; `None` where it is beyond their ends, or they hardly cross. The search starts at the
+/// parameters `from`, those of the [`nearest`] points of their segments.
+#[inline]
+pub(crate) fn feet(own: &Piece<'_>, other: &Piece<'_>, from: [f32; 2]) -> Option<[f32; 2]> {
+    let [mut t, mut s] = from;
+    let least = least_sine2(own, other);
+    for _ in 0..feet_steps(own, other) {
         let (d, e) = (own.tangent(t), other.tangent(s));
         let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
         let sine2 = dd * ee - de * de;
@@ -266,15 +301,26 @@ pub(crate) fn crossing(
     if past_end(t, own) || past_end(s, other) {
         return None;
     }
+    Some([t, s])
+}
+
+/// Contact of the piece `own`, turned by `rotation` into this frame, with the piece `other` of the field's part, at the [`feet`] of their common perpendicular;
+/// `None` where they do not cross, hardly cross, or do not face each other.
+pub(crate) fn crossing(
+    own: &Piece<'_>,
+    other: &Piece<'_>,
+    rotation: &Mat3,
+    [t, s]: [f32; 2],
+) -> Option<Crossing> {
     let (d, e) = (own.tangent(t), other.tangent(s));
     let across = d.cross(e);
     let (squared, lengths2) = (across.length_squared(), d.length_squared() * e.length_squared());
-    if squared <= least * lengths2 {
+    if squared <= least_sine2(own, other) * lengths2 {
         return None;
     }
     let unit = across * inverse_sqrt(squared);
     let cones = [own.normals(rotation), other.normals(&Mat3::IDENTITY)];
-    let faces = |n: Vec3| in_cone(cones[1], e, n) && in_cone(cones[0], d, -n);
+    let faces = |n: Vec3| in_cone(cones[1], e, n, CONE_SINE) && in_cone(cones[0], d, -n, CONE_SINE);
     let normal = [unit, -unit].into_iter().find(|&n| faces(n))?;
     let point = own.at(t);
     let apart = point - other.at(s);
@@ -311,7 +357,7 @@ mod tests {
     fn crossing(own: &EdgeRecord, other: &EdgeRecord) -> Option<Crossing> {
         let [own, other] = [own, other].map(Piece::fixed);
         let (from, distance) = nearest(&own, &other);
-        let found = super::crossing(&own, &other, &Mat3::IDENTITY, from)?;
+        let found = super::crossing(&own, &other, &Mat3::IDENTITY, feet(&own, &other, from)?)?;
         assert!(distance <= found.gap.abs() + 1e-8, "{distance} {found:?}");
         Some(found)
     }

@@ -8,18 +8,21 @@
 //! than [`DEPTH_SHARE`] of the thinner part is not taken for a contact unless the same edges crossed in the tick before: else the far edges of a
 //! thin bar, which face the other part too, would pull it through. The same holds for edges at a flat angle, see [`DEPTH_PER_SINE_M`].
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use heapless::Vec;
 use mortise_protocol::image::{EDGE_ERROR_CELLS, EdgeRecord, NodeRecord};
 
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
 use crate::collision::cost::{
-    CIRCLE, CIRCLE_PAIR, CROSSING, EDGE_BOUND, EDGE_NODE, EDGE_PAIR, EDGE_TRAVEL, LOOKUP, MATING, NODE,
-    PASSED_OVER, PIECE, PIECE_BOUND,
+    CIRCLE, CIRCLE_PAIR, CROSSING, EDGE_BOUND, EDGE_NODE, EDGE_PAIR, EDGE_TRAVEL, FEET_STEP, LOOKUP, MATING,
+    NODE, PASSED_OVER, PIECE, PIECE_BOUND,
 };
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::edge_crossing::{Circle, Crossing, Piece, are_within, crossing, nearest, run_along};
+use crate::collision::edge_cache::{CachedPairs, PiecePairs};
+use crate::collision::edge_crossing::{
+    Circle, Crossing, Piece, are_within, crossing, feet, feet_steps, may_face, nearest, run_along,
+};
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::Key;
 use crate::collision::rules::{FacePairRules, Mating};
@@ -44,10 +47,25 @@ const EARLY_M: f32 = 0.25e-3;
 /// See [`EARLY_M`]; a power of two.
 const EARLY_TICKS: u32 = 8;
 
-/// Pieces of the other part's edges near a leaf; more are compared in groups of this size.
-type Near<'i> = Vec<Piece<'i>, NEAR_PIECES>;
+/// Near pairs of pieces are kept for this further travel, m, and for [`KEPT_TICKS`] ticks of the last motion,
+const KEPT_M: f32 = 50e-6;
+/// See [`KEPT_M`].
+const KEPT_TICKS: f32 = 16.0;
+/// but for no more than this, m: the farther, the more pairs,
+const MOST_KEPT_M: f32 = 0.5e-3;
+/// and not where fewer ticks than this would use it up.
+const LEAST_KEPT_TICKS: f32 = 4.0;
+
+/// Pieces of the other part's edges near a leaf, by index; more are compared in groups of this size.
+type Near<'i> = Vec<(u32, Piece<'i>), NEAR_PIECES>;
 /// See [`Near`].
 const NEAR_PIECES: usize = 16;
+
+/// Pairs of pieces of a leaf that are kept while the held part turns by up to `turn`, rad; `None` where there are too many, or none are to be kept.
+struct Kept {
+    pairs: Option<PiecePairs>,
+    turn: f32,
+}
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Searches the edges of a forward pair; nodes are numbered on from the pointshell's. Returns where it stopped when the budget ran out.
@@ -132,8 +150,12 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.open(key, node.skip);
                 continue;
             }
+            if self.is_short() {
+                return Some(here);
+            }
             // As long as its bound holds, none of its pieces can touch.
             let holds = distance > self.search.margin || matches!(known, Known::Far(_));
+            let before = self.spent;
             let travel = if holds {
                 self.travel_to_edges(pair, node)
             } else {
@@ -141,6 +163,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 let lasting = known == Known::Nothing;
                 self.edge_leaf(pair, here, node, lasting)
             };
+            self.evaluated(before);
             let distance = larger(distance, travel);
             ancestors.note(if distance > self.search.margin {
                 self.coherence.set_distance(key, distance)
@@ -174,25 +197,89 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         node: &NodeRecord,
         lasting: bool,
     ) -> f32 {
-        let reach = self.search.margin + DEEPEST_M;
-        let mut near = Near::new();
-        let mut any_near = false;
-        self.near_edges(pair, node, reach, |search, other| {
-            // Emptied when full, so there is space.
-            let _ = near.push(other);
-            if near.is_full() {
-                any_near |= search.cross(pair, leaf, node, &near);
-                near.clear();
-            }
-        });
-        if !near.is_empty() {
-            any_near |= self.cross(pair, leaf, node, &near);
-        }
+        let known = (self.coherence).cached_pairs(pair.keys.of(leaf.node), self.horizon);
+        let any_near = match known {
+            CachedPairs::Pairs(&pairs) => self.cross_kept(pair, leaf, node, &pairs),
+            CachedPairs::Many => self.cross_all(pair, leaf, node, None),
+            CachedPairs::Unknown => self.cross_all(pair, leaf, node, self.kept_m()),
+        };
         if any_near || !lasting || self.left() == 0 {
             0.0
         } else {
             self.travel_to_edges(pair, node)
         }
+    }
+
+    /// For how much travel near pairs are kept, m; `None` where it would soon be used up.
+    fn kept_m(&self) -> Option<f32> {
+        let way = self.search.way;
+        let kept = smaller(KEPT_M + KEPT_TICKS * way, MOST_KEPT_M);
+        (kept > LEAST_KEPT_TICKS * way).then_some(kept)
+    }
+
+    /// Searches the other part's edges for pieces near a leaf and offers their crossings. Pairs that come near within a travel of `kept_m` are kept.
+    /// Returns whether any may touch before long.
+    fn cross_all(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        node: &NodeRecord,
+        kept_m: Option<f32>,
+    ) -> bool {
+        let reach = self.reach() + kept_m.unwrap_or(0.0);
+        let mut near = Near::new();
+        let mut kept = Kept {
+            pairs: kept_m.map(|_| PiecePairs::EMPTY),
+            turn: kept_m.unwrap_or(0.0) * self.most_turn(),
+        };
+        let mut any_near = false;
+        self.near_edges(pair, node, reach, |search, other| {
+            // Emptied when full, so there is space.
+            let _ = near.push(other);
+            if near.is_full() {
+                any_near |= search.cross(pair, leaf, node, (&near, reach), &mut kept);
+                near.clear();
+            }
+        });
+        if !near.is_empty() {
+            any_near |= self.cross(pair, leaf, node, (&near, reach), &mut kept);
+        }
+        if let Some(kept_m) = kept_m {
+            let key = pair.keys.of(leaf.node);
+            let travel = self.search.margin + kept_m;
+            self.coherence.cache_pairs(key, kept.pairs, travel);
+        }
+        any_near
+    }
+
+    /// The most by which the held part turns for its travel, rad/m: a part that turns by an angle travels at least that times its radius.
+    fn most_turn(&self) -> f32 {
+        let held = self.search.parts.get(usize::from(self.search.held));
+        held.map_or(0.0, |part| 1.0 / part.radius)
+    }
+
+    /// Keeps a pair, unless it cannot face each other while it is kept.
+    fn keep(
+        &mut self,
+        kept: &mut Kept,
+        (own, other): (&Piece<'_>, &Piece<'_>),
+        rotation: &Mat3,
+        (index, other_index): (usize, u32),
+    ) {
+        let Some(pairs) = &mut kept.pairs else {
+            return;
+        };
+        self.spent += CROSSING;
+        if !may_face(own, other, rotation, kept.turn) {
+            pairs.others_near = true;
+        } else if !pairs.push(index, other_index) {
+            kept.pairs = None;
+        }
+    }
+
+    /// Distance within which pieces are compared, m.
+    fn reach(&self) -> f32 {
+        self.search.margin + DEEPEST_M
     }
 
     /// What the object must travel until the pieces of a leaf can touch an edge of the other part, m: a lower bound that is to last for a while, at most
@@ -220,7 +307,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         pair: &DirectedPair<'i>,
         leaf: &NodeRecord,
         reach: f32,
-        mut visit: impl FnMut(&mut Self, Piece<'i>),
+        mut visit: impl FnMut(&mut Self, (u32, Piece<'i>)),
     ) {
         let (center, radius) = (pair.to_field.apply(leaf.center), leaf.radius);
         let tree = pair.field_edges;
@@ -236,51 +323,97 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             if node.skip != index {
                 continue;
             }
-            for record in node.points(tree.pieces) {
+            for (index, record) in (node.first_point..).zip(node.points(tree.pieces)) {
                 self.spent += EDGE_BOUND;
                 if are_within(
                     (Vec3::from_array(record.center), record.radius),
                     (center, radius),
                     reach,
                 ) {
-                    visit(self, Piece::fixed(record));
+                    visit(self, (index, Piece::fixed(record)));
                 }
             }
         }
     }
 
-    /// Offers the crossings of the pieces of a leaf with `near` pieces of the other part. Returns whether any may touch before long.
+    /// Offers the crossings of the pieces of a leaf with `near` pieces of the other part. Adds pairs within `reach` (m) to those `kept`. Returns whether any may touch before long.
     fn cross(
         &mut self,
         pair: &DirectedPair<'_>,
         leaf: NodeCursor,
         node: &NodeRecord,
-        near: &[Piece<'_>],
+        (near, reach): (&[(u32, Piece<'_>)], f32),
+        kept: &mut Kept,
     ) -> bool {
         let rotation = pair.to_field.rotation();
-        let reach = self.search.margin + DEEPEST_M;
         let mut any_near = false;
-        for record in node.points(pair.edges.pieces) {
+        for (index, record) in node.points(pair.edges.pieces).iter().enumerate() {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
             self.spent += PIECE + EDGE_BOUND * near.len() as u32;
-            for other in near {
+            for (other_index, other) in near {
                 if !other.is_within(center, radius, reach) || !self.is_near(&own, other, reach) {
                     continue;
                 }
-                self.spent += EDGE_PAIR;
-                let (from, distance) = nearest(&own, other);
-                if distance > reach || run_along(&own, other, from) {
-                    continue;
-                }
-                any_near = true;
-                self.spent += CROSSING;
-                if let Some(found) = crossing(&own, other, rotation, from) {
-                    self.touch(pair, leaf, [record, other.record], &found);
-                }
+                self.keep(kept, (&own, other), rotation, (index, *other_index));
+                any_near |= self.compare(pair, leaf, &own, other);
             }
         }
         any_near
+    }
+
+    /// As [`Self::cross`], for the pairs that were kept.
+    fn cross_kept(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        node: &NodeRecord,
+        pairs: &PiecePairs,
+    ) -> bool {
+        let rotation = pair.to_field.rotation();
+        let records = node.points(pair.edges.pieces);
+        let mut any_near = pairs.others_near;
+        let mut last: Option<(usize, Piece<'_>)> = None;
+        for (index, other) in pairs.iter() {
+            let other = pair.field_edges.pieces.get(other);
+            let Some((record, other)) = records.get(index).zip(other) else {
+                continue;
+            };
+            let own = match last.take() {
+                Some((last, own)) if last == index => own,
+                _ => {
+                    self.spent += PIECE;
+                    Piece::placed(record, pair.to_field.apply(record.center), rotation)
+                }
+            };
+            any_near |= self.compare(pair, leaf, &own, &Piece::fixed(other));
+            last = Some((index, own));
+        }
+        any_near
+    }
+
+    /// Offers the crossing of two pieces. Returns whether they may touch before long.
+    #[inline(always)]
+    fn compare(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        own: &Piece<'_>,
+        other: &Piece<'_>,
+    ) -> bool {
+        self.spent += EDGE_PAIR;
+        let (from, distance) = nearest(own, other);
+        if distance > self.reach() || run_along(own, other, from) {
+            return false;
+        }
+        self.spent += FEET_STEP * feet_steps(own, other) as u32;
+        if let Some(feet) = feet(own, other, from) {
+            self.spent += CROSSING;
+            if let Some(found) = crossing(own, other, pair.to_field.rotation(), feet) {
+                self.touch(pair, leaf, [own.record, other.record], &found);
+            }
+        }
+        true
     }
 
     /// Whether a piece is at most `reach` (m) apart from the sphere about another one.
@@ -305,7 +438,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         &mut self,
         pair: &DirectedPair<'_>,
         node: &NodeRecord,
-        near: &[Piece<'_>],
+        near: &[(u32, Piece<'_>)],
         mut least: f32,
     ) -> f32 {
         if near.is_empty() {
@@ -316,15 +449,13 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let mut circles: [Option<Circle>; NEAR_PIECES] = [const { None }; NEAR_PIECES];
         // Long enough that the distance, which costs more, is not asked for.
         let lasting = self.search.margin + DEEPEST_M + EARLY_M;
-        // A part that turns by an angle travels at least that times its radius.
-        let held = self.search.parts.get(usize::from(self.search.held));
-        let turn = held.map_or(0.0, |part| 1.0 / part.radius);
+        let turn = self.most_turn();
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
             let mut circle = None;
             self.spent += PIECE + EDGE_BOUND * near.len() as u32;
-            for (other, other_circle) in near.iter().zip(&mut circles) {
+            for ((_, other), other_circle) in near.iter().zip(&mut circles) {
                 if !other.is_within(center, radius, least) || !self.is_near(&own, other, least) {
                     continue;
                 }

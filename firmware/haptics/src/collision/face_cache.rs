@@ -58,7 +58,9 @@ impl FaceCache {
     }
 
     pub fn clear(&mut self) {
-        self.slots.fill(Slot::EMPTY);
+        for slot in &mut self.slots {
+            slot.until_nm = 0;
+        }
     }
 
     /// Cached face of the selected points of a leaf at the given travel.

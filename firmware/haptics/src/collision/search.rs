@@ -83,6 +83,10 @@ pub(crate) struct Search<'s, 'i, R> {
     pub budget: u32,
     /// Part of the budget reserved for the step.
     pub reserved: u32,
+    /// No leaf begins that may exceed the budget: a tick with an energy has nothing to spare.
+    pub strict: bool,
+    /// Cost of the last tick's dearest leaf, eighths of a field query.
+    pub dearest_leaf: u32,
     /// Contacts carried over, which enter the step even if the search finds none.
     pub carried: u32,
     /// Gap below which points are braked, m; 0 for no braking. With braking, points in proximity voxels are candidates too.
@@ -124,10 +128,12 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             .pairs(start, None)
             .or_else(|| traversal.pairs(NodeCursor::FIRST, Some(start)));
         let (spent, not_found, point_work) = (traversal.spent, traversal.expected, traversal.point_work);
-        let mut carried = 0;
+        let dearest = traversal.dearest;
+        let [mut carried, mut near] = [0; 2];
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET);
-            carried = contacts.carry(&self.motions[0], |leaf| {
+            let limit = |row: &[f32; 6]| self.slack + self.approach(row);
+            [carried, near] = contacts.carry(&self.motions[0], limit, |leaf| {
                 let visited = if start < stop {
                     start <= leaf && leaf < stop
                 } else {
@@ -138,8 +144,9 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         }
         let found = self.expected() - not_found;
         let used = Used {
-            all: (spent + PUSHING * carried - PUSHING * not_found) / LOOKUP,
-            point_work: (point_work + PUSHING * (found + carried)) / LOOKUP,
+            all: (spent + PUSHING * carried + CANDIDATE * near - PUSHING * not_found) / LOOKUP,
+            point_work: (point_work + PUSHING * (found + carried) + CANDIDATE * near) / LOOKUP,
+            dearest,
         };
         (stop, used)
     }
@@ -198,6 +205,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             face_searches: 0,
             mating_cache: MatingCache::NONE,
             near: 0,
+            dearest: 0,
             boxes: None,
         }
     }
@@ -229,6 +237,8 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     mating_cache: MatingCache,
     /// Number of points within the margin.
     pub near: u32,
+    /// Cost of the dearest leaf so far, eighths of a field query.
+    dearest: u32,
     /// The last part of which the boxes were compared, and their gap, m.
     pub boxes: Option<(u16, f32)>,
 }
@@ -354,8 +364,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.open(key, node.skip);
                 continue;
             }
-            let mask = mask(self.search.decimation, node.first_point);
             let points = node.points(pair.points);
+            let mask = mask(self.search.decimation, node.first_point, points);
             // Queried as seldom as the field is.
             if queried
                 && !pair.excluded.is_empty()
@@ -366,7 +376,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 continue;
             }
             // A leaf is evaluated as a whole, unless it exceeds even the whole budget.
-            if (self.left() as usize) < points.len() && self.work.points > 0 {
+            if (self.left() as usize) < points.len() && self.work.points > 0 || self.is_short() {
                 return Some(here);
             }
             self.spent += LEAF;
@@ -381,6 +391,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 }
             });
             self.charge_surfaces(pair);
+            self.evaluated(before);
             self.point_work += self.spent - before - self.decimation_work;
             self.decimation_work = 0;
         }
@@ -577,6 +588,18 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             self.spent += CANDIDATE;
         }
         self.work.candidates = self.work.candidates.saturating_add(1);
+    }
+
+    /// Whether a leaf as dear as the dearest of this tick and the last would exceed a strict budget. Never before the first leaf, so that each one's turn comes.
+    pub fn is_short(&self) -> bool {
+        let most = self.dearest.max(self.search.dearest_leaf);
+        let limit = LOOKUP.saturating_mul(self.search.budget);
+        self.search.strict && self.dearest > 0 && self.spent.saturating_add(most) > limit
+    }
+
+    /// Notes what a leaf has cost, of which the evaluation began at `before`.
+    pub fn evaluated(&mut self, before: u32) {
+        self.dearest = self.dearest.max(self.spent - before);
     }
 
     /// Budget left, field queries.

@@ -26,7 +26,7 @@
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::{ENERGY_DEPTHS, Energy, SceneImage};
 
-use crate::collision::cost::energy_cost;
+use crate::collision::cost::{energy_cost, face_pairs_cost};
 use crate::collision::placement::Placed;
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::force::{ForceTerm, Iterate};
@@ -291,9 +291,10 @@ impl GeometricEnergy {
     }
 
     /// What it takes of a tick's budget, field queries; in a busy tick as in a calm one, since a budget that changed with it would make the next tick calm.
-    pub fn cost(&self) -> u32 {
+    /// With it, since nothing is to spare, what it takes to gather as many `face_pairs` as in the last tick.
+    pub fn cost(&self, face_pairs: u16) -> u32 {
         if self.round.running || self.found.is_some() {
-            energy_cost(CHARGES_PER_TICK)
+            energy_cost(CHARGES_PER_TICK) + face_pairs_cost(face_pairs)
         } else {
             0
         }

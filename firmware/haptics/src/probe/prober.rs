@@ -158,6 +158,8 @@ fn resting_search<'s, 'i>(
         decimation: 0,
         budget: u32::MAX,
         reserved: 0,
+        strict: false,
+        dearest_leaf: 0,
         carried: 0,
         braking_m: 0.0,
         rules: &NoRules,
