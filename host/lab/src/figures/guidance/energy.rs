@@ -528,8 +528,7 @@ mod tests {
         }
     }
 
-    /// Prisms with many sides, whose search runs out of its budget in most ticks: with points of edges decimated, and contacts about to push forgotten, half of
-    /// these recordings overlapped by more than a millimetre.
+    /// Prisms with many sides, whose search runs out of its budget in most ticks: with points of edges decimated, such recordings overlapped by millimetres.
     #[test]
     #[cfg_attr(debug_assertions, ignore = "bakes energies, minutes without optimisation")]
     fn careless_motion_puts_no_prism_into_the_walls() {
