@@ -6,7 +6,7 @@
 //!
 //! When the budget runs out, work is dropped in this order. First, the step gets only as many solves as the budget has left, four at least. Second,
 //! contacts in leaves not reached that pushed, or may now, are carried over, their gaps advanced by the last motion, and the next tick resumes where this one
-//! stopped, round and round. Third, when two ticks do not complete a round (the ticks after a grab excepted), points are decimated evenly where
+//! stopped, round and round. Third, when two ticks do not complete a round (the ticks after a grab excepted), points inside of faces are decimated evenly where
 //! points are the bulk of the work: each second, fourth or eighth near point is queried where points take a quarter of the budget; where they still
 //! take half of it, whole leaves are decimated, down to each 128th point. The selection stays the same until the budget suffices again
 //! ([`super::decimation`]). The error bound of the pointshell grows by a factor of four at each step; all else stays as it was. Carrying over is
@@ -77,7 +77,7 @@ pub(crate) struct Search<'s, 'i, R> {
     pub inverse_length: f32,
     /// The last tick needed half of the budget or more.
     pub busy: bool,
-    /// Only each 2ⁿth near point of a leaf is queried.
+    /// Decides which near points of a leaf are queried.
     pub decimation: Decimation,
     /// Work budget of the tick, field queries.
     pub budget: u32,

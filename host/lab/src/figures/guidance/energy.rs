@@ -25,7 +25,7 @@ const ENERGY_INSTRUCTIONS: f64 = 20_000.0;
 pub(super) const TICK_INSTRUCTIONS: f64 = 120_000.0;
 /// Energy made, mJ.
 const MADE_MJ: f64 = 1.0;
-/// Deepest overlap under a careless hand, mm: as under a fast one.
+/// Deepest overlap under a careless hand, mm: what is asked of contact under a hand of 1 m/s.
 const CARELESS_OVERLAP_MM: f64 = 0.3;
 /// Heights above the mouth, mm.
 const ABOVE_MM: [f64; 3] = [1.0, 2.0, 5.0];
@@ -542,7 +542,7 @@ mod tests {
                 let (overlap, made) = (outcome.penetration_mm, outcome.energy_given_mj);
                 eprintln!("{section:?} {seed}: {overlap:.3} mm, {made:.4} mJ");
                 assert!(
-                    overlap < 0.6 && made < MADE_MJ,
+                    overlap < 0.4 && made < 0.01,
                     "{section:?} {seed}: {overlap} mm, {made} mJ"
                 );
             }
