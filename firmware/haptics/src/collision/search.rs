@@ -4,7 +4,10 @@
 //! Without the backward direction a sharp fixed rim would slip between the points of a tilted part. Both directions traverse a preorder sphere tree
 //! and skip every sphere whose distance, by the field at its centre, exceeds the margin.
 //!
-//! When the budget runs out, work is dropped in this order. First, the step gets only as many solves as the budget has left, four at least. Second,
+//! A tick has room for as many contacts as its budget pays for: the deepest, and those that a rotation would bring to touch first.
+//!
+//! When the budget runs out, work is dropped in this order. First, the step gets only as many solves as the budget has left, four at least. Second, a leaf
+//! that would exceed the budget is left for the next tick;
 //! contacts in leaves not reached that pushed, or may now, are carried over, their gaps advanced by the last motion, and the next tick resumes where this one
 //! stopped, round and round. Third, when two ticks do not complete a round (the ticks after a grab excepted), points inside of faces are decimated evenly where
 //! points are the bulk of the work: each second, fourth or eighth near point is queried where points take a quarter of the budget; where they still
@@ -30,7 +33,7 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, exact, exact_on_face, on_surface_of, with_allowance};
 use crate::collision::facing::faces_away;
 use crate::collision::node_cursor::NodeCursor;
-use crate::collision::node_key::{ALL, SHORTEST_SHARE};
+use crate::collision::node_key::{ALL, Points, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
@@ -48,6 +51,11 @@ pub(crate) const APPROACH: f32 = 2.0;
 /// Points whose bound would expire within this many more ticks like the last one count as near and are queried every tick: evaluating the whole leaf
 /// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
+/// Field queries of a span that presses.
+const PRESSED_SPAN: u32 = 16;
+/// A leaf takes no more field queries than this.
+const MOST_OF_A_LEAF: u32 = 256;
+
 /// Inputs of one search: all that a tick fixes before it. Many fields, because the innermost loops read them.
 pub(crate) struct Search<'s, 'i, R> {
     pub scene: &'s SceneImage<'i>,
@@ -83,8 +91,10 @@ pub(crate) struct Search<'s, 'i, R> {
     pub budget: u32,
     /// Part of the budget reserved for the step.
     pub reserved: u32,
-    /// Contacts carried over, which enter the step even if the search finds none.
-    pub carried: u32,
+    /// Contacts carried over, which enter the step even if the search finds none: those that pushed, and others.
+    pub carried: [u32; 2],
+    /// Contacts that the tick has room for.
+    pub room: usize,
     /// Gap below which points are braked, m; 0 for no braking. With braking, points in proximity voxels are candidates too.
     pub braking_m: f32,
     /// Rules of the constraints in force for guided faces.
@@ -124,11 +134,11 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             .pairs(start, None)
             .or_else(|| traversal.pairs(NodeCursor::FIRST, Some(start)));
         let (spent, not_found, point_work) = (traversal.spent, traversal.expected, traversal.point_work);
-        let [mut carried, mut near] = [0; 2];
+        let mut carried = [0; 2];
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET);
             let limit = |row: &[f32; 6]| self.slack + self.approach(row);
-            [carried, near] = contacts.carry(&self.motions[0], limit, |leaf| {
+            carried = contacts.carry(&self.motions[0], limit, |leaf| {
                 let visited = if start < stop {
                     start <= leaf && leaf < stop
                 } else {
@@ -137,10 +147,10 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
                 !visited
             });
         }
-        let found = self.expected() - not_found;
         let used = Used {
-            all: (spent + PUSHING * carried + CANDIDATE * near - PUSHING * not_found) / LOOKUP,
-            point_work: (point_work + PUSHING * (found + carried) + CANDIDATE * near) / LOOKUP,
+            all: (spent + cost_of(carried) - cost_of(not_found)) / LOOKUP,
+            point_work: (point_work + cost_of(self.expected()) + cost_of(carried) - cost_of(not_found))
+                / LOOKUP,
         };
         (stop, used)
     }
@@ -166,12 +176,14 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         Some(pair)
     }
 
-    /// Contacts paid for before the search. A quarter of the budget at least is left, so that every leaf's turn comes.
-    fn expected(&self) -> u32 {
+    /// Contacts paid for before the search, of those carried over. A quarter of the budget at least is left, so that every leaf's turn comes.
+    fn expected(&self) -> [u32; 2] {
         let most = LOOKUP
             .saturating_mul(self.budget / 4 * 3)
             .saturating_sub(LOOKUP * self.reserved);
-        self.carried.min(most / PUSHING)
+        let [pushed, others] = self.carried;
+        let pushed = pushed.min(most / PUSHING);
+        [pushed, others.min((most - PUSHING * pushed) / CANDIDATE)]
     }
 
     /// A traversal that has not begun, with an empty contact store; with `keep_previous` the previous contacts can be carried over.
@@ -182,7 +194,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         contacts: &'w mut Contacts,
         work: &'w mut Work,
     ) -> Traversal<'w, 'w, 'i, R> {
-        contacts.begin(keep_previous);
+        contacts.begin(keep_previous, self.room);
         let expected = self.expected();
         Traversal {
             search: self,
@@ -190,7 +202,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             coherence,
             contacts,
             work,
-            spent: LOOKUP * self.reserved + PUSHING * expected,
+            spent: LOOKUP * self.reserved + cost_of(expected),
             expected,
             point_work: 0,
             decimation_work: 0,
@@ -199,6 +211,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             face_searches: 0,
             mating_cache: MatingCache::NONE,
             near: 0,
+            has_evaluated: false,
             boxes: None,
         }
     }
@@ -220,8 +233,8 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     pub decimation_work: u32,
     /// Of that, on exclusion queries.
     pub exclusion_work: u32,
-    /// Candidates already paid for and not yet found.
-    expected: u32,
+    /// Contacts already paid for and not yet found, as [`Search::carried`].
+    expected: [u32; 2],
     /// Leaves whose decimated points were queried.
     pub decimated_queries: u32,
     /// Leaves whose face was searched for.
@@ -230,6 +243,8 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     mating_cache: MatingCache,
     /// Number of points within the margin.
     pub near: u32,
+    /// Whether any leaf was evaluated.
+    has_evaluated: bool,
     /// The last part of which the boxes were compared, and their gap, m.
     pub boxes: Option<(u16, f32)>,
 }
@@ -366,8 +381,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.note(Bound::NOW);
                 continue;
             }
-            // A leaf is evaluated as a whole, unless it exceeds even the whole budget.
-            if (self.left() as usize) < points.len() && self.work.points > 0 {
+            if self.is_short_of(|| queries_of(points, near & mask)) {
                 return Some(here);
             }
             self.spent += LEAF;
@@ -572,18 +586,42 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Counts a candidate, a point that may touch, and charges it to the budget.
     #[inline(always)]
     pub fn count_candidate(&mut self) {
-        if self.expected > 0 {
-            self.expected -= 1;
-        } else {
-            self.spent += CANDIDATE;
+        match &mut self.expected {
+            [0, 0] => self.spent += CANDIDATE,
+            [0, expected] | [expected, _] => *expected -= 1,
         }
         self.work.candidates = self.work.candidates.saturating_add(1);
+    }
+
+    /// Whether the budget falls short of a leaf that takes this many `queries`. A leaf is evaluated as a whole; the first one of a tick always, so that each
+    /// one's turn comes.
+    #[inline]
+    pub fn is_short_of(&mut self, queries: impl FnOnce() -> u32) -> bool {
+        let left = self.left();
+        let is_short = self.has_evaluated && left < MOST_OF_A_LEAF && left < queries();
+        self.has_evaluated = true;
+        is_short
     }
 
     /// Budget left, field queries.
     pub fn left(&self) -> u32 {
         self.search.budget.saturating_sub(self.spent / LOOKUP)
     }
+}
+
+/// Field queries that a leaf's `points` take, those selected by `which`, at most: a span that presses is the dearest.
+#[inline(never)]
+fn queries_of(points: &[PointRecord], which: Points) -> u32 {
+    let chosen = |i: usize| which & 1u16.checked_shl(i as u32).unwrap_or(1) != 0;
+    let of = |point: &PointRecord| if point.span == NO_SPAN { 1 } else { PRESSED_SPAN };
+    (points.iter().enumerate())
+        .map(|(i, point)| if chosen(i) { of(point) } else { 0 })
+        .sum()
+}
+
+/// Cost of contacts that are carried over: of those that pushed, and of others.
+fn cost_of([pushed, others]: [u32; 2]) -> u32 {
+    PUSHING * pushed + CANDIDATE * others
 }
 
 /// Faces of the held part and of the other part, where a point meets a face.
