@@ -160,13 +160,7 @@ fn search(
     let settings = given.settings;
     let (rules, springs) = (constraints.rules, constraints.springs);
     let budget = constraints.budget(settings);
-    let cleared = if memory.coherence.renew() {
-        CLEARED / LOOKUP
-    } else {
-        0
-    };
-    let solves = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + spring_cost(springs);
-    let reserved = cleared + solves + face_pairs_cost(memory.face_pairs);
+    let reserved = reserve(memory, free.solves, springs);
     let held_shape = given.scene.shape_of_part(usize::from(grabbed.part));
     let shrunk_m = memory.shrink(settings, &held_shape.field);
     let search = Search {
@@ -213,6 +207,18 @@ fn search(
     work.flags
         .insert_if(memory.contacts.dropped() > 0, Flags::CONTACTS);
     used.all
+}
+
+/// Field queries kept for all but the search: solves with and without contacts, springs, faces that touch as in the last tick, and the table of bounds if it is
+/// cleared.
+fn reserve(memory: &mut ContactMemory, free_solves: u8, springs: usize) -> u32 {
+    let cleared = if memory.coherence.renew() {
+        CLEARED / LOOKUP
+    } else {
+        0
+    };
+    let solves = solve_cost(springs) * u32::from(free_solves + LEAST_SOLVES) + spring_cost(springs);
+    cleared + solves + face_pairs_cost(memory.face_pairs)
 }
 
 /// The step with the contacts in `memory`, by the integrator in the settings.

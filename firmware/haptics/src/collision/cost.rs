@@ -139,6 +139,11 @@ pub(crate) fn contact_room(budget: u32) -> usize {
     paid_for.clamp(LEAST_CONTACTS, MAX_CONTACTS)
 }
 
+/// Cost of contacts that are carried over, eighths of a field query: of those that pushed, and of others.
+pub(crate) fn carried_cost([pushed, others]: [u32; 2]) -> u32 {
+    PUSHING * pushed + CANDIDATE * others
+}
+
 /// Cost of setting up this many springs, field queries.
 pub(crate) fn spring_cost(springs: usize) -> u32 {
     SPRING * springs as u32 / LOOKUP

@@ -258,7 +258,7 @@ pub(crate) fn feet(own: &Piece<'_>, other: &Piece<'_>, from: [f32; 2], turn: f32
         s += (dd * ea - de * da) * inverse;
         share2 = sine2 / (dd * ee);
         // Far past the ends the quadratic is no longer the edge.
-        if !straight && !(t.abs() <= 2.0 && s.abs() <= 2.0) {
+        if !(straight || t.abs() <= 2.0 && s.abs() <= 2.0) {
             return Err(0.0);
         }
     }

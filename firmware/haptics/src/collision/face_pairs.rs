@@ -42,7 +42,7 @@ struct Gathered {
 }
 
 /// Adds the face pairs of all pushing contacts to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes
-/// first. Returns for how many their faces were told apart, which takes the time.
+/// first. Returns the number of pairs whose faces were put in order, which takes most of the time.
 ///
 /// Contacts come in tree order, so the last pair is tried first. Cost: 30 instructions per contact, 200 per pair, and 1000 for each of the deepest [`MAX_PAIRS`].
 pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) -> u16 {
@@ -87,8 +87,14 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
             None => drop(merged.push(g.clone())),
         }
     }
+    report(&merged, pairs);
+    deepest.len() as u16
+}
+
+/// Adds the pairs to those reported, deepest first.
+fn report(merged: &[Gathered], pairs: &mut FacePairs) {
     // Insertion into a sorted list of bounded length: at most MAX_GATHERED · MAX_PAIRS comparisons.
-    for g in &merged {
+    for g in merged {
         let p = FacePair {
             insertion_m: g.to - g.from,
             ..g.pair
@@ -104,7 +110,6 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
             let _ = pairs.insert(place, p);
         }
     }
-    deepest.len() as u16
 }
 
 impl Gathered {

@@ -26,14 +26,14 @@ use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
-    ALLOWANCE, CANDIDATE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, PUSHING, Used,
+    ALLOWANCE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, Used, carried_cost,
 };
 use crate::collision::decimation::Decimation;
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, exact, exact_on_face, on_surface_of, with_allowance};
 use crate::collision::facing::faces_away;
 use crate::collision::node_cursor::NodeCursor;
-use crate::collision::node_key::{ALL, Points, SHORTEST_SHARE};
+use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
@@ -51,11 +51,6 @@ pub(crate) const APPROACH: f32 = 2.0;
 /// Points whose bound would expire within this many more ticks like the last one count as near and are queried every tick: evaluating the whole leaf
 /// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
-/// Field queries of a span that presses.
-const PRESSED_SPAN: u32 = 16;
-/// A leaf takes no more field queries than this.
-const MOST_OF_A_LEAF: u32 = 256;
-
 /// Inputs of one search: all that a tick fixes before it. Many fields, because the innermost loops read them.
 pub(crate) struct Search<'s, 'i, R> {
     pub scene: &'s SceneImage<'i>,
@@ -148,8 +143,9 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             });
         }
         let used = Used {
-            all: (spent + cost_of(carried) - cost_of(not_found)) / LOOKUP,
-            point_work: (point_work + cost_of(self.expected()) + cost_of(carried) - cost_of(not_found))
+            all: (spent + carried_cost(carried) - carried_cost(not_found)) / LOOKUP,
+            point_work: (point_work + carried_cost(self.expected()) + carried_cost(carried)
+                - carried_cost(not_found))
                 / LOOKUP,
         };
         (stop, used)
@@ -176,16 +172,6 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         Some(pair)
     }
 
-    /// Contacts paid for before the search, of those carried over. A quarter of the budget at least is left, so that every leaf's turn comes.
-    fn expected(&self) -> [u32; 2] {
-        let most = LOOKUP
-            .saturating_mul(self.budget / 4 * 3)
-            .saturating_sub(LOOKUP * self.reserved);
-        let [pushed, others] = self.carried;
-        let pushed = pushed.min(most / PUSHING);
-        [pushed, others.min((most - PUSHING * pushed) / CANDIDATE)]
-    }
-
     /// A traversal that has not begun, with an empty contact store; with `keep_previous` the previous contacts can be carried over.
     pub fn traverse<'w>(
         &'w self,
@@ -202,7 +188,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             coherence,
             contacts,
             work,
-            spent: LOOKUP * self.reserved + cost_of(expected),
+            spent: LOOKUP * self.reserved + carried_cost(expected),
             expected,
             point_work: 0,
             decimation_work: 0,
@@ -234,7 +220,7 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     /// Of that, on exclusion queries.
     pub exclusion_work: u32,
     /// Contacts already paid for and not yet found, as [`Search::carried`].
-    expected: [u32; 2],
+    pub expected: [u32; 2],
     /// Leaves whose decimated points were queried.
     pub decimated_queries: u32,
     /// Leaves whose face was searched for.
@@ -244,7 +230,7 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     /// Number of points within the margin.
     pub near: u32,
     /// Whether any leaf was evaluated.
-    has_evaluated: bool,
+    pub has_evaluated: bool,
     /// The last part of which the boxes were compared, and their gap, m.
     pub boxes: Option<(u16, f32)>,
 }
@@ -381,7 +367,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.note(Bound::NOW);
                 continue;
             }
-            if self.is_short_of(|| queries_of(points, near & mask)) {
+            if self.is_short_of_points(points, near & mask) {
                 return Some(here);
             }
             self.spent += LEAF;
@@ -582,46 +568,6 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     pub fn mating_of(&mut self, leaf: NodeCursor, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
         (self.mating_cache).get(self.search.rules, leaf.part(), moving, fixed)
     }
-
-    /// Counts a candidate, a point that may touch, and charges it to the budget.
-    #[inline(always)]
-    pub fn count_candidate(&mut self) {
-        match &mut self.expected {
-            [0, 0] => self.spent += CANDIDATE,
-            [0, expected] | [expected, _] => *expected -= 1,
-        }
-        self.work.candidates = self.work.candidates.saturating_add(1);
-    }
-
-    /// Whether the budget falls short of a leaf that takes this many `queries`. A leaf is evaluated as a whole; the first one of a tick always, so that each
-    /// one's turn comes.
-    #[inline]
-    pub fn is_short_of(&mut self, queries: impl FnOnce() -> u32) -> bool {
-        let left = self.left();
-        let is_short = self.has_evaluated && left < MOST_OF_A_LEAF && left < queries();
-        self.has_evaluated = true;
-        is_short
-    }
-
-    /// Budget left, field queries.
-    pub fn left(&self) -> u32 {
-        self.search.budget.saturating_sub(self.spent / LOOKUP)
-    }
-}
-
-/// Field queries that a leaf's `points` take, those selected by `which`, at most: a span that presses is the dearest.
-#[inline(never)]
-fn queries_of(points: &[PointRecord], which: Points) -> u32 {
-    let chosen = |i: usize| which & 1u16.checked_shl(i as u32).unwrap_or(1) != 0;
-    let of = |point: &PointRecord| if point.span == NO_SPAN { 1 } else { PRESSED_SPAN };
-    (points.iter().enumerate())
-        .map(|(i, point)| if chosen(i) { of(point) } else { 0 })
-        .sum()
-}
-
-/// Cost of contacts that are carried over: of those that pushed, and of others.
-fn cost_of([pushed, others]: [u32; 2]) -> u32 {
-    PUSHING * pushed + CANDIDATE * others
 }
 
 /// Faces of the held part and of the other part, where a point meets a face.
