@@ -117,8 +117,8 @@ costs! {
     SPRING_IN_SOLVE = 475;
     /// Charge of a geometric energy.
     CHARGE = 230;
-    /// Model of the geometric energies, with what it adds to four solves with contacts and to two without.
-    MODEL = 9900;
+    /// Model of the geometric energies, with what it adds to four solves.
+    MODEL = 6000;
     /// Clearing the table of advancement bounds.
     CLEARED = 10_000;
     /// Gathering the contacts of a pair of faces for telemetry.
@@ -219,7 +219,7 @@ mod tests {
                 ("SOLVE", 64),
                 ("SPRING_IN_SOLVE", 20),
                 ("CHARGE", 10),
-                ("MODEL", 417),
+                ("MODEL", 253),
                 ("CLEARED", 421),
                 ("FACE_PAIR", 55),
             ]),

@@ -49,7 +49,7 @@ const EARLY_M: f32 = 0.25e-3;
 const EARLY_TICKS: u32 = 8;
 
 /// Near pairs of pieces are kept for this travel, m, and for [`KEPT_TICKS`] ticks of the last motion,
-const KEPT_M: f32 = 0.1e-3;
+const KEPT_M: f32 = 0.25e-3;
 /// See [`KEPT_M`].
 const KEPT_TICKS: f32 = 16.0;
 /// but for no more than this, m: the farther, the more pairs,
@@ -239,13 +239,18 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             CachedPairs::Many => None,
             CachedPairs::Unknown(entry) => self.keep_pairs(pair, key, node, entry),
         };
-        if let Some(entry) = entry {
-            return self.cross_kept(pair, leaf, node, entry);
-        }
-        if self.cross_all(pair, leaf, node) || !lasting || self.left() == 0 {
+        let rest_m = match entry {
+            Some(entry) => self.cross_kept(pair, leaf, node, entry),
+            None if self.cross_all(pair, leaf, node) => 0.0,
+            None => f32::INFINITY,
+        };
+        if rest_m > self.search.margin && lasting && self.left() > 0 {
+            // Lasts longer than the entry.
+            self.travel_to_edges(pair, node)
+        } else if rest_m == f32::INFINITY {
             0.0
         } else {
-            self.travel_to_edges(pair, node)
+            rest_m
         }
     }
 
