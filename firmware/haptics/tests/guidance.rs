@@ -218,8 +218,7 @@ fn pressed_under(targets: usize) -> (f32, u32) {
     (seen.deepest_m, fewest)
 }
 
-/// Targets do not use up the budget that contact needs. The box lands on the points that a tick has room for, which are fewer with targets: 0.71 µm deep at most
-/// instead of 0.50.
+/// Targets do not use up the budget that contact needs.
 #[test]
 fn contact_is_rendered_however_many_targets_are_active() {
     let (alone, _) = pressed_under(0);
@@ -232,7 +231,7 @@ fn contact_is_rendered_however_many_targets_are_active() {
         );
         assert!(fewest > 0, "{targets} targets");
         assert!(
-            deepest < 1.5 * alone,
+            deepest < 1.1 * alone,
             "{targets} targets: {deepest} m, {alone} m without"
         );
     }

@@ -16,14 +16,6 @@ pub const QUERY_INSTRUCTIONS: u32 = 190;
 /// Minimum contact solves per step, regardless of search cost; most steps need fewer. The budget reserves them before the search.
 pub const LEAST_SOLVES: u8 = 4;
 
-/// Contacts that a tick has room for, whatever its budget.
-const LEAST_CONTACTS: usize = 48;
-/// Field queries of a tick that are not for contacts that push: solves, faces that touch, and some of the search.
-const BESIDE_CONTACTS: u32 = 210;
-
-/// Springs that cost as much in a solve as the model of the geometric energies does: 1,480 instructions.
-pub(crate) const ENERGY_IN_SOLVE: usize = 3;
-
 /// A row of [`TABLE`].
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
@@ -68,7 +60,7 @@ costs! {
     /// Extra cost of a candidate, a point that may touch: 180, and 37 a solve; half of them do, and in most ticks two solves are enough.
     CANDIDATE = 180 + 2 * 37;
     /// Extra cost of a contact that pushed in the last tick, whether it is found again or carried over, with two solves.
-    PUSHING = 560 + 2 * 40;
+    PUSHING = 480 + 2 * 40;
     /// Extra cost of a candidate in each solve past the third.
     CANDIDATE_IN_SOLVE = 71;
     /// Transforms and data of a pair of parts, in one direction, that is searched.
@@ -101,12 +93,8 @@ costs! {
     CIRCLE = 190;
     /// Bound of the travel until two circles cross.
     CIRCLE_PAIR = 67;
-    /// Pair of pieces of edges that is kept for a leaf.
-    KEPT_PAIR = 24;
-    /// Step to the common perpendicular of two pieces of edges.
-    FEET_STEP = 95;
     /// Contact of two pieces of edges.
-    CROSSING = 285;
+    CROSSING = 380;
     /// Fixed cost of a search for the travel until a leaf's edges may touch.
     EDGE_TRAVEL = 760;
     /// Setting up a target's spring and what depends on it, without its cost in a solve.
@@ -117,12 +105,8 @@ costs! {
     SPRING_IN_SOLVE = 475;
     /// Charge of a geometric energy.
     CHARGE = 230;
-    /// Model of the geometric energies, with what it adds to four solves.
-    MODEL = 6000;
-    /// Clearing the table of advancement bounds.
-    CLEARED = 10_000;
-    /// Gathering the contacts of a pair of faces for telemetry.
-    FACE_PAIR = 1300;
+    /// Model of the geometric energies, with what it adds to the solves.
+    MODEL = 2500;
 }
 
 /// Reads of the field's bricks and cells that cost as much as one query, [`LOOKUP`].
@@ -133,17 +117,6 @@ const fn eighths(instructions: u32) -> u32 {
     (8 * instructions + QUERY_INSTRUCTIONS / 2) / QUERY_INSTRUCTIONS
 }
 
-/// Contacts that a tick with this budget has room for: as many as it pays for if all push.
-pub(crate) fn contact_room(budget: u32) -> usize {
-    let paid_for = (LOOKUP.saturating_mul(budget.saturating_sub(BESIDE_CONTACTS)) / PUSHING) as usize;
-    paid_for.clamp(LEAST_CONTACTS, MAX_CONTACTS)
-}
-
-/// Cost of contacts that are carried over, eighths of a field query: of those that pushed, and of others.
-pub(crate) fn carried_cost([pushed, others]: [u32; 2]) -> u32 {
-    PUSHING * pushed + CANDIDATE * others
-}
-
 /// Cost of setting up this many springs, field queries.
 pub(crate) fn spring_cost(springs: usize) -> u32 {
     SPRING * springs as u32 / LOOKUP
@@ -152,11 +125,6 @@ pub(crate) fn spring_cost(springs: usize) -> u32 {
 /// Cost of the model of geometric energies and of this many charges, field queries.
 pub(crate) fn energy_cost(charges: u16) -> u32 {
     (MODEL + CHARGE * u32::from(charges)) / LOOKUP
-}
-
-/// Cost of gathering contacts by this many pairs of faces, field queries.
-pub(crate) fn face_pairs_cost(pairs: u16) -> u32 {
-    FACE_PAIR * u32::from(pairs) / LOOKUP
 }
 
 /// Cost of one solve with this many springs, field queries.
@@ -194,7 +162,7 @@ mod tests {
                 ("MATING", 2),
                 ("ALLOWANCE", 8),
                 ("CANDIDATE", 11),
-                ("PUSHING", 27),
+                ("PUSHING", 24),
                 ("CANDIDATE_IN_SOLVE", 3),
                 ("PAIR", 25),
                 ("LEAF", 6),
@@ -211,17 +179,13 @@ mod tests {
                 ("EDGE_PAIR", 3),
                 ("CIRCLE", 8),
                 ("CIRCLE_PAIR", 3),
-                ("KEPT_PAIR", 1),
-                ("FEET_STEP", 4),
-                ("CROSSING", 12),
+                ("CROSSING", 16),
                 ("EDGE_TRAVEL", 32),
                 ("SPRING", 48),
                 ("SOLVE", 64),
                 ("SPRING_IN_SOLVE", 20),
                 ("CHARGE", 10),
-                ("MODEL", 253),
-                ("CLEARED", 421),
-                ("FACE_PAIR", 55),
+                ("MODEL", 105),
             ]),
             "{TABLE:#?}"
         );
@@ -229,7 +193,6 @@ mod tests {
             assert_eq!(spring_cost(n), 6 * n as u32);
             assert_eq!(solve_cost(n), 8 + 5 * n as u32 / 2);
         }
-        assert_eq!([0, 520, 5000].map(contact_room), [48, 91, MAX_CONTACTS]);
         for candidates in 0..=MAX_CONTACTS as u16 {
             assert_eq!(
                 further_solve_cost(3, candidates),

@@ -8,22 +8,20 @@
 //! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
 //! | `exact_surface`, `patch`, `facing` | distance to exact surfaces, and to local patches of free-form ones; normals that rule out a contact |
 //! | `span`, `span_search` | spans of sharp edges: the distance along one, and the place of it that touches |
-//! | `coherence`, `node_key`, `ancestors`, `face_cache`, `edge_cache` | advancement bounds, cached faces and near pairs of edges kept from earlier ticks |
+//! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
 //! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
-//! | `cost`, `budget`, `decimation` | cost model of the work budget; what a search may still spend of it; decimation of points when it does not suffice |
+//! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
 //! | `contact`, `side`, `face_pairs` | bounded store of contacts; side from which a leaf came to a thin part; touching face pairs |
 //! | `placement`, `node_cursor` | placement of a part; position of the search in all trees |
 
 pub(crate) mod ancestors;
 mod boxes;
-mod budget;
 pub(crate) mod coherence;
 pub(crate) mod contact;
 pub mod cost;
 pub(crate) mod decimation;
 pub(crate) mod directed_pair;
-mod edge_cache;
-pub mod edge_crossing;
+pub(crate) mod edge_crossing;
 mod edge_search;
 pub(crate) mod exact_surface;
 mod exclusion;
