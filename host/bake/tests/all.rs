@@ -13,6 +13,7 @@ mod far_origins;
 mod field;
 mod finer;
 mod free_form;
+mod kept_edges;
 mod occupancy;
 mod planner;
 mod pointshell;
