@@ -58,6 +58,18 @@ impl Slot {
             own: 0,
         }; MOST],
     };
+
+    /// What its entry says up to the `horizon_nm`, a travel.
+    fn known(&self, entry: Entry, horizon_nm: u32) -> CachedPairs {
+        let holds = horizon_nm < self.until_nm;
+        match self.len {
+            0 if !holds => CachedPairs::Unknown(entry),
+            WANTED => CachedPairs::Wanted(entry),
+            _ if !holds => CachedPairs::Wanted(entry),
+            TOO_MANY => CachedPairs::Many,
+            _ => CachedPairs::In(entry),
+        }
+    }
 }
 
 /// What is known of the edges of a leaf.
@@ -93,19 +105,16 @@ impl EdgeCache {
     /// What is known of a leaf's edges up to the `horizon_nm`, a travel; the travel now is `travel_nm`.
     pub fn get(&self, leaf: Key, travel_nm: u32, horizon_nm: u32) -> CachedPairs {
         // Hashed: near leaves lie at regular distances in a tree.
-        let place = (leaf.hash() >> (u32::BITS - SLOT_BITS)) as u8;
-        let slot = &self.slots[usize::from(place)];
-        if slot.leaf != leaf && travel_nm < slot.until_nm {
-            CachedPairs::Many
-        } else if slot.leaf != leaf || slot.len == 0 && horizon_nm >= slot.until_nm {
-            CachedPairs::Unknown(Entry(place))
-        } else if slot.len == WANTED || horizon_nm >= slot.until_nm {
-            CachedPairs::Wanted(Entry(place))
-        } else if slot.len == TOO_MANY {
-            CachedPairs::Many
-        } else {
-            CachedPairs::In(Entry(place))
+        let first = (leaf.hash() >> (u32::BITS - SLOT_BITS)) as u8;
+        let places = [first, first ^ 1];
+        let slot = |place: u8| &self.slots[usize::from(place)];
+        if let Some(place) = places.into_iter().find(|&place| slot(place).leaf == leaf) {
+            return slot(place).known(Entry(place), horizon_nm);
         }
+        let free = places
+            .into_iter()
+            .find(|&place| travel_nm >= slot(place).until_nm);
+        free.map_or(CachedPairs::Many, |place| CachedPairs::Unknown(Entry(place)))
     }
 
     /// Reserves a free entry for a leaf, to be made when the leaf is compared again.
@@ -219,17 +228,20 @@ mod tests {
         assert_eq!(cache.get(leaf(7), 0, 100), CachedPairs::Unknown(entry));
     }
 
-    /// On collision a live entry is neither returned nor evicted.
+    /// Of two slots a leaf gets the one that is free; live entries are neither returned for another leaf nor evicted.
     #[test]
     fn a_slot_holds_one_leaf() {
         let mut cache = EdgeCache::new();
-        let entry = made(&mut cache, leaf(0), 100);
-        let other = (1..100_000)
+        let first = made(&mut cache, leaf(0), 100);
+        let second = Entry(first.0 ^ 1);
+        let mut others = (1..100_000)
             .map(leaf)
-            .find(|&l| cache.get(l, 0, 0) == CachedPairs::Many);
-        let other = other.expect("more leaves than slots");
-        assert_eq!(cache.get(other, 99, 200), CachedPairs::Many);
-        assert_eq!(cache.get(other, 100, 200), CachedPairs::Unknown(entry));
+            .filter(|&l| cache.clone().get(l, 99, 99) == CachedPairs::Unknown(second));
+        let [other, third] =
+            [others.next(), others.next()].map(|other| other.expect("more leaves than slots"));
+        cache.begin(second, other, 200);
+        assert_eq!(cache.get(third, 99, 200), CachedPairs::Many);
+        assert_eq!(cache.get(third, 100, 200), CachedPairs::Unknown(first));
     }
 
     #[test]
