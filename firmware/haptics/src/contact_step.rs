@@ -4,10 +4,7 @@ use glam::Vec3;
 use mortise_protocol::image::SceneImage;
 
 use crate::baseline::explicit;
-use crate::collision::cost::{
-    CLEARED, ENERGY_IN_SOLVE, LEAST_SOLVES, LOOKUP, contact_room, face_pairs_cost, further_solve_cost,
-    solve_cost, spring_cost,
-};
+use crate::collision::cost::{LEAST_SOLVES, further_solve_cost, solve_cost, spring_cost};
 use crate::collision::decimation::Searched;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::placement::Placed;
@@ -64,11 +61,6 @@ impl<R> Constraints<'_, R> {
     fn budget(&self, settings: &Settings) -> u32 {
         let whole = settings.contact.point_budget;
         whole - self.energies.min(whole / 2)
-    }
-
-    /// Springs that cost as much in a solve as the geometric energies.
-    fn energy_in_solve(&self) -> usize {
-        if self.energies > 0 { ENERGY_IN_SOLVE } else { 0 }
     }
 }
 
@@ -133,11 +125,7 @@ pub(crate) fn contact_step<T: ForceTerm>(
     let left = budget.saturating_sub(used);
     // Those carried over are solved for, too.
     let contacts = work.candidates.max(memory.contacts.as_slice().len() as u16);
-    let solves = most_solves(
-        left,
-        contacts,
-        constraints.springs + constraints.energy_in_solve(),
-    );
+    let solves = most_solves(left, contacts, constraints.springs);
     let motion = (step, terms, free);
     let solution = solve(given, memory, grabbed, motion, constraints.guided_share, solves);
     memory.pushing = memory.contacts.pushing() as u16;
@@ -160,7 +148,7 @@ fn search(
     let settings = given.settings;
     let (rules, springs) = (constraints.rules, constraints.springs);
     let budget = constraints.budget(settings);
-    let reserved = reserve(memory, free.solves, springs);
+    let reserved = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + spring_cost(springs);
     let held_shape = given.scene.shape_of_part(usize::from(grabbed.part));
     let shrunk_m = memory.shrink(settings, &held_shape.field);
     let search = Search {
@@ -185,8 +173,7 @@ fn search(
         budget,
         // Reserve at least half of the budget for contact search, however many targets are active.
         reserved: reserved.min(budget / 2),
-        carried: memory.carried(),
-        room: contact_room(budget),
+        carried: if memory.busy { u32::from(memory.pushing) } else { 0 },
         braking_m: given.braking_m(),
         rules,
     };
@@ -195,30 +182,18 @@ fn search(
     work.flags.insert_if(search.decimation.level() > 0, Flags::BUDGET);
     memory.resume = stopped.unwrap_or(NodeCursor::FIRST);
     memory.busy = used.all > budget / 2;
-    let touching = memory.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count();
+    let touching = memory.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
     memory.decimation.update(&Searched {
         start,
         stopped,
         used,
         budget,
-        offered: memory.contacts.offered(),
+        touching,
+        lost: memory.contacts.lost(),
     });
     memory.sharing = larger(larger(touching as f32, 1.0), memory.sharing * SHARING_DECAY);
-    work.flags
-        .insert_if(memory.contacts.dropped() > 0, Flags::CONTACTS);
+    work.flags.insert_if(memory.contacts.dropped(), Flags::CONTACTS);
     used.all
-}
-
-/// Field queries kept for all but the search: solves with and without contacts, springs, faces that touch as in the last tick, and the table of bounds if it is
-/// cleared.
-fn reserve(memory: &mut ContactMemory, free_solves: u8, springs: usize) -> u32 {
-    let cleared = if memory.coherence.renew() {
-        CLEARED / LOOKUP
-    } else {
-        0
-    };
-    let solves = solve_cost(springs) * u32::from(free_solves + LEAST_SOLVES) + spring_cost(springs);
-    cleared + solves + face_pairs_cost(memory.face_pairs)
 }
 
 /// The step with the contacts in `memory`, by the integrator in the settings.

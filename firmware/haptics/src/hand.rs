@@ -50,8 +50,6 @@ pub(crate) struct ContactMemory {
     pub decimation: Decimation,
     /// Number of contacts that pushed in the last tick.
     pub pushing: u16,
-    /// Number of pairs of faces by which its contacts were gathered.
-    pub face_pairs: u16,
     /// How far points of the held part are moved inward before voxmaps are queried, m.
     pub shrunk_m: f32,
     /// Advancement bounds of tree nodes.
@@ -134,17 +132,6 @@ impl Hand {
 }
 
 impl ContactMemory {
-    /// Contacts of a busy tick, which may be carried over: those that push, and others.
-    pub fn carried(&self) -> [u32; 2] {
-        let pushing = u32::from(self.pushing);
-        let all = self.contacts.as_slice().len() as u32;
-        if self.busy {
-            [pushing, all.saturating_sub(pushing)]
-        } else {
-            [0; 2]
-        }
-    }
-
     const fn new() -> Self {
         Self {
             sharing: 0.0,
@@ -152,7 +139,6 @@ impl ContactMemory {
             busy: false,
             decimation: Decimation::NEW,
             pushing: 0,
-            face_pairs: 0,
             shrunk_m: 0.0,
             coherence: Coherence::new(),
             contacts: Contacts::new(),
@@ -165,7 +151,6 @@ impl ContactMemory {
         self.busy = false;
         self.decimation = Decimation::NEW;
         self.pushing = 0;
-        self.face_pairs = 0;
         self.contacts.clear();
         self.coherence.invalidate();
     }

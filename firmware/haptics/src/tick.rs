@@ -315,7 +315,7 @@ fn react(
         guidance: moved.guidance,
         work: Work::default(),
     };
-    hand.contact.face_pairs = touching_faces(contacts, &scenery, &mut out.pairs);
+    touching_faces(contacts, &scenery, &mut out.pairs);
     (hand.contact.coherence).travelled(period_s * point_speed(grabbed.twist, grabbed.body.reach));
     hand.grabbed = Some(grabbed);
     out.handle = hand.limited(wanted, input, settings, &mut work.flags);

@@ -20,8 +20,6 @@ use crate::collision::node_key::{ALL, Key, Points, SLOTS};
 
 /// Travel beyond which it is reset to zero and the table is cleared: 1.8 m.
 const LONGEST_NM: u32 = 1_800_000_000;
-/// Travel beyond which a tick does so before its search, where the cost is charged: 1.7 m. No part travels 0.1 m in a tick.
-const RENEWED_NM: u32 = 1_700_000_000;
 // Bounds stay clear of the flag [`EXCLUDED`].
 const _: () = assert!(LONGEST_NM + FARTHEST_NM < EXCLUDED);
 /// Flag in the bound of a node that a contact exclusion keeps apart.
@@ -125,15 +123,6 @@ impl Coherence {
         if self.travel_nm > LONGEST_NM {
             self.clear();
         }
-    }
-
-    /// Clears the table before the travel becomes too long. Returns whether it did, for the tick's budget.
-    pub fn renew(&mut self) -> bool {
-        let is_due = self.travel_nm > RENEWED_NM;
-        if is_due {
-            self.clear();
-        }
-        is_due
     }
 
     /// Resets the travel, and voids all entries by their tags: a third of the instructions of zeroing all of the table.

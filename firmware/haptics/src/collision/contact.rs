@@ -1,13 +1,12 @@
 //! Contacts of one tick: a bounded store that keeps the deepest contacts and the ones with the longest lever arms.
 
 use glam::Vec3;
-use mortise_protocol::image::NO_FACE;
 
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::side::Sides;
 use crate::math::symmetric6::dot;
 
-/// Capacity for contacts per tick; a tick may have room for fewer.
+/// Capacity for contacts per tick.
 pub const MAX_CONTACTS: usize = 256;
 
 /// A point near the other part or inside it, linearised about the tick's start. The solver's numbers and the faces stand in one record, because a contact is kept,
@@ -62,26 +61,6 @@ impl Contact {
         edges: [0; 2],
         leaf: NodeCursor::FIRST,
     };
-
-    /// Whether its point lies inside of a face of the part whose point it is.
-    fn is_inside_face(&self) -> bool {
-        let own = if self.leaf.is_backward() {
-            self.static_edge_face
-        } else {
-            self.moving_edge_face
-        };
-        !self.single && own == NO_FACE
-    }
-}
-
-/// Contacts that a tick found, and how many it had room for.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Offered {
-    /// Of points inside of faces, for which others can stand.
-    pub inside: u32,
-    /// Of edges and corners.
-    pub others: u32,
-    pub room: u32,
 }
 
 /// Branch of a contact's piecewise linear force.
@@ -95,11 +74,11 @@ pub(crate) enum Phase {
     Closing,
 }
 
-/// Contacts kept for their depth in a full store; as many are kept for their lever arm.
+/// Contacts kept for their depth; as many are kept for their lever arm.
 const HALF: usize = MAX_CONTACTS / 2;
 
-/// Store of as many contacts as a tick has room for, at most [`MAX_CONTACTS`]. Of all offered, half are the deepest; the other half are those of the rest that
-/// a rotation would bring to touch first.
+/// Store of at most [`MAX_CONTACTS`] contacts. Of all offered, half are the deepest; the other half are those of the rest that a rotation would bring
+/// to touch first.
 ///
 /// The deepest alone would all lie on the side to which a part leans; with no contacts on the other side it would rock. Among equals the first
 /// offered stay. A contact is filled in place: it is too large to pass by value in the innermost loop.
@@ -111,14 +90,14 @@ pub(crate) struct Contacts {
     current: usize,
     /// Length of this tick's list.
     len: usize,
-    /// Largest length of this tick's list, an even number.
-    room: usize,
     /// Heap over the first half after an overflow: the least deep on top.
     by_gap: Heap,
     /// Heap over the second half after an overflow: the largest reach gap on top.
     by_reach: Heap,
-    /// Number of dropped contacts.
-    dropped: u32,
+    /// Whether the list overflowed.
+    dropped: bool,
+    /// Number of dropped contacts that touch.
+    lost: u32,
     /// Square of the longest arm, m².
     farthest2: f32,
     /// Length of the last tick's list.
@@ -134,7 +113,6 @@ pub(crate) struct Contacts {
 struct Heap {
     keys: [f32; HALF],
     places: [u8; HALF],
-    len: usize,
 }
 
 // Every index into the list must fit a byte.
@@ -145,19 +123,17 @@ impl Heap {
         Self {
             keys: [0.0; HALF],
             places: [0; HALF],
-            len: 0,
         }
     }
 
     /// Builds the heap over the contacts at `places`, by the `key` of each.
     #[cold]
     fn build(&mut self, places: &[u8], key: impl Fn(u8) -> f32) {
-        self.len = places.len().min(HALF);
         for (i, &place) in places.iter().enumerate().take(HALF) {
             self.keys[i] = key(place);
             self.places[i] = place;
         }
-        for i in (0..self.len / 2).rev() {
+        for i in (0..HALF / 2).rev() {
             self.sift_down(i);
         }
     }
@@ -179,11 +155,11 @@ impl Heap {
         let (key, place) = (self.keys[i], self.places[i]);
         loop {
             let left = 2 * i + 1;
-            if left >= self.len {
+            if left >= HALF {
                 break;
             }
             let right = left + 1;
-            let child = if right < self.len && self.keys[right] > self.keys[left] {
+            let child = if right < HALF && self.keys[right] > self.keys[left] {
                 right
             } else {
                 left
@@ -204,10 +180,10 @@ impl Contacts {
             lists: [[Contact::NONE; MAX_CONTACTS]; 2],
             current: 0,
             len: 0,
-            room: MAX_CONTACTS,
             by_gap: Heap::new(),
             by_reach: Heap::new(),
-            dropped: 0,
+            dropped: false,
+            lost: 0,
             farthest2: 0.0,
             previous_len: 0,
             carried_len: 0,
@@ -219,21 +195,22 @@ impl Contacts {
     pub fn clear(&mut self) {
         self.sides.clear();
         self.len = 0;
-        self.dropped = 0;
+        self.dropped = false;
+        self.lost = 0;
         self.farthest2 = 0.0;
         self.previous_len = 0;
         self.carried_len = 0;
     }
 
-    /// Empties the store for the next tick, which has `room` for this many. With `keep_previous` the contacts it held can be restored by [`Self::carry`].
-    pub fn begin(&mut self, keep_previous: bool, room: usize) {
-        self.room = room.clamp(2, MAX_CONTACTS) & !1;
+    /// Empties the store for the next tick. With `keep_previous` the contacts it held can be restored by [`Self::carry`].
+    pub fn begin(&mut self, keep_previous: bool) {
         self.sides.begin();
         self.previous_len = self.len;
         self.carried_len = if keep_previous { self.len } else { 0 };
         self.current = 1 - self.current;
         self.len = 0;
-        self.dropped = 0;
+        self.dropped = false;
+        self.lost = 0;
         self.farthest2 = 0.0;
     }
 
@@ -297,22 +274,14 @@ impl Contacts {
         self.as_slice().iter().filter(|c| c.phase != Phase::Free).count()
     }
 
-    /// Number of contacts dropped since [`Self::begin`].
-    pub fn dropped(&self) -> u32 {
+    /// Whether any contact was dropped since [`Self::clear`].
+    pub fn dropped(&self) -> bool {
         self.dropped
     }
 
-    /// Number of contacts offered since [`Self::begin`]: of points inside of faces, and of others. Those dropped are taken to be of either kind in proportion
-    /// to those kept.
-    pub fn offered(&self) -> Offered {
-        let all = self.len as u32 + self.dropped;
-        let inside = self.as_slice().iter().filter(|c| c.is_inside_face()).count() as u32;
-        let inside = inside * all / (self.len as u32).max(1);
-        Offered {
-            inside,
-            others: all - inside,
-            room: self.room as u32,
-        }
+    /// Number of contacts that touch and were dropped since [`Self::clear`].
+    pub fn lost(&self) -> u32 {
+        self.lost
     }
 
     /// The longest lever arm of all contacts accepted, m.
@@ -334,7 +303,7 @@ impl Contacts {
     /// Index of the slot of [`Self::offer`].
     #[inline]
     fn place(&mut self, gap: f32, reach_gap: f32, arm2: f32) -> Option<usize> {
-        let place = if self.len < self.room {
+        let place = if self.len < MAX_CONTACTS {
             self.len += 1;
             self.len - 1
         } else {
@@ -350,32 +319,34 @@ impl Contacts {
     #[inline(never)]
     fn displace(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
         let list = &mut self.lists[self.current];
-        self.dropped += 1;
-        if self.dropped == 1 {
+        if !self.dropped {
+            self.dropped = true;
             // Only places, of a byte each, are put in order: contacts are a hundred times as large.
             let mut places: [u8; MAX_CONTACTS] = core::array::from_fn(|place| place as u8);
-            let (places, _) = places.split_at_mut(self.room);
             let of = |place: u8| &list[usize::from(place)];
-            places.select_nth_unstable_by(self.room / 2, |a, b| of(*a).gap.total_cmp(&of(*b).gap));
-            let (deepest, rest) = places.split_at(self.room / 2);
+            places.select_nth_unstable_by(HALF, |a, b| of(*a).gap.total_cmp(&of(*b).gap));
+            let (deepest, rest) = places.split_at(HALF);
             self.by_gap.build(deepest, |place| of(place).gap);
             self.by_reach.build(rest, |place| of(place).reach_gap);
         }
         if gap >= self.by_gap.largest() {
-            return self.displace_in_second_half(reach_gap);
+            return self.displace_in_second_half(gap, reach_gap);
         }
         let place = self.by_gap.replace_largest(gap);
         let displaced = self.lists[self.current][place];
-        if let Some(second) = self.displace_in_second_half(displaced.reach_gap) {
+        if let Some(second) = self.displace_in_second_half(displaced.gap, displaced.reach_gap) {
             self.lists[self.current][second] = displaced;
         }
         Some(place)
     }
 
-    /// Index in the second half, unless all contacts there would touch sooner.
-    fn displace_in_second_half(&mut self, reach_gap: f32) -> Option<usize> {
+    /// Index in the second half, unless all contacts there would touch sooner. Counts the dropped contact if it touches.
+    fn displace_in_second_half(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
         let sooner = reach_gap < self.by_reach.largest();
-        sooner.then(|| self.by_reach.replace_largest(reach_gap))
+        let place = sooner.then(|| self.by_reach.replace_largest(reach_gap));
+        let left_out = place.map_or(gap, |place| self.lists[self.current][place].gap);
+        self.lost += u32::from(left_out < 0.0);
+        place
     }
 }
 
@@ -394,7 +365,9 @@ mod tests {
                 c.moving_face = x as u16;
             }
         }
-        assert_eq!(contacts.dropped(), 2048 - MAX_CONTACTS as u32);
+        assert!(contacts.dropped());
+        // No gap is negative.
+        assert_eq!(contacts.lost(), 0);
         let mut kept = [false; 2048];
         for c in contacts.as_slice() {
             assert_eq!(
@@ -407,7 +380,7 @@ mod tests {
             assert_eq!(*kept, !(HALF..2048 - HALF).contains(&gap), "{gap}");
         }
         contacts.clear();
-        assert!(contacts.dropped() == 0 && contacts.as_slice().is_empty());
+        assert!(!contacts.dropped() && contacts.as_slice().is_empty());
     }
 
     #[test]
@@ -417,27 +390,26 @@ mod tests {
             // The deeper half comes last, so every one of it displaces another.
             assert!(contacts.offer(-(i as f32), 0.0, 0.0).is_some());
         }
-        assert_eq!(contacts.dropped(), 0);
+        assert!(!contacts.dropped());
         let sum: f32 = contacts.as_slice().iter().map(|c| c.gap).sum();
         assert_eq!(sum, -((MAX_CONTACTS * (MAX_CONTACTS - 1) / 2) as f32));
     }
 
     #[test]
-    fn counts_what_was_offered_by_kind() {
+    fn counts_dropped_contacts_that_touch() {
         let mut contacts = Contacts::new();
-        contacts.begin(false, 100);
-        for i in 0..2048 {
-            if let Some(c) = contacts.offer(-(i as f32), 0.0, 0.0) {
-                c.moving_edge_face = if i % 4 == 0 { 3 } else { NO_FACE };
-            }
+        let mut x = 1u32;
+        let touching = 700;
+        for _ in 0..2048 {
+            x = (x * 1021 + 7) % 2048;
+            // The deepest have the shortest lever arms.
+            let gap = x as f32 - touching as f32;
+            let _ = contacts.offer(gap, 0.5 * gap, 0.0);
         }
-        assert_eq!(contacts.as_slice().len(), 100);
-        assert_eq!(contacts.dropped(), 2048 - 100);
-        let offered = contacts.offered();
-        assert_eq!((offered.inside + offered.others, offered.room), (2048, 100));
-        assert!(offered.inside.abs_diff(1536) < 40, "{offered:?}");
-        contacts.begin(false, MAX_CONTACTS);
-        assert_eq!(contacts.dropped(), 0);
+        let kept = contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
+        assert_eq!(contacts.lost() + kept, touching);
+        contacts.begin(false);
+        assert_eq!(contacts.lost(), 0);
     }
 
     /// Of ten contacts, the first five pushed; the others are free, each 1 µm farther off than the last.
@@ -453,7 +425,7 @@ mod tests {
             c.moving_face = i;
         }
         let motion = [0.0, 0.0, 1e-6, 0.0, 0.0, 0.0];
-        contacts.begin(true, MAX_CONTACTS);
+        contacts.begin(true);
         assert_eq!(contacts.carry(&motion, |_| 1.0, |_| false), [0, 0]);
         assert!(contacts.as_slice().is_empty());
         // Free ones have 1 to 5 µm left.
@@ -466,7 +438,7 @@ mod tests {
             let gap = if i < 5 { -1e-6 } else { (i - 5) as f32 * 1e-6 };
             assert_eq!(c.gap, gap + 1e-6);
         }
-        contacts.begin(false, MAX_CONTACTS);
+        contacts.begin(false);
         assert_eq!(contacts.carry(&motion, |_| 1.0, |_| true), [0, 0]);
         assert!(contacts.as_slice().is_empty());
     }

@@ -16,17 +16,6 @@ pub const QUERY_INSTRUCTIONS: u32 = 190;
 /// Minimum contact solves per step, regardless of search cost; most steps need fewer. The budget reserves them before the search.
 pub const LEAST_SOLVES: u8 = 4;
 
-/// Contacts that a tick has room for, whatever its budget.
-const LEAST_CONTACTS: usize = 48;
-/// Field queries of a tick that are not for contacts that push: solves, faces that touch, and some of the search.
-const BESIDE_CONTACTS: u32 = 210;
-
-/// Pairs of faces whose cost is among that of a tick beside its budget.
-const FEW_FACE_PAIRS: u16 = 1;
-
-/// Springs that cost as much in a solve as the model of the geometric energies does: 1,480 instructions.
-pub(crate) const ENERGY_IN_SOLVE: usize = 3;
-
 /// A row of [`TABLE`].
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
@@ -120,12 +109,8 @@ costs! {
     SPRING_IN_SOLVE = 475;
     /// Charge of a geometric energy.
     CHARGE = 230;
-    /// Model of the geometric energies, with what it adds to four solves.
-    MODEL = 6000;
-    /// Clearing the table of advancement bounds.
-    CLEARED = 10_000;
-    /// Gathering the contacts of a pair of faces for telemetry.
-    FACE_PAIR = 1300;
+    /// Model of the geometric energies, with what it adds to the solves.
+    MODEL = 2500;
 }
 
 /// Reads of the field's bricks and cells that cost as much as one query, [`LOOKUP`].
@@ -136,17 +121,6 @@ const fn eighths(instructions: u32) -> u32 {
     (8 * instructions + QUERY_INSTRUCTIONS / 2) / QUERY_INSTRUCTIONS
 }
 
-/// Contacts that a tick with this budget has room for: as many as it pays for if all push.
-pub(crate) fn contact_room(budget: u32) -> usize {
-    let paid_for = (LOOKUP.saturating_mul(budget.saturating_sub(BESIDE_CONTACTS)) / PUSHING) as usize;
-    paid_for.clamp(LEAST_CONTACTS, MAX_CONTACTS)
-}
-
-/// Cost of contacts that are carried over, eighths of a field query: of those that pushed, and of others.
-pub(crate) fn carried_cost([pushed, others]: [u32; 2]) -> u32 {
-    PUSHING * pushed + CANDIDATE * others
-}
-
 /// Cost of setting up this many springs, field queries.
 pub(crate) fn spring_cost(springs: usize) -> u32 {
     SPRING * springs as u32 / LOOKUP
@@ -155,11 +129,6 @@ pub(crate) fn spring_cost(springs: usize) -> u32 {
 /// Cost of the model of geometric energies and of this many charges, field queries.
 pub(crate) fn energy_cost(charges: u16) -> u32 {
     (MODEL + CHARGE * u32::from(charges)) / LOOKUP
-}
-
-/// Cost of gathering contacts by this many pairs of faces, field queries, beyond that of the [`FEW_FACE_PAIRS`] of most ticks.
-pub(crate) fn face_pairs_cost(pairs: u16) -> u32 {
-    FACE_PAIR * u32::from(pairs.saturating_sub(FEW_FACE_PAIRS)) / LOOKUP
 }
 
 /// Cost of one solve with this many springs, field queries.
@@ -222,9 +191,7 @@ mod tests {
                 ("SOLVE", 64),
                 ("SPRING_IN_SOLVE", 20),
                 ("CHARGE", 10),
-                ("MODEL", 253),
-                ("CLEARED", 421),
-                ("FACE_PAIR", 55),
+                ("MODEL", 105),
             ]),
             "{TABLE:#?}"
         );
@@ -232,7 +199,6 @@ mod tests {
             assert_eq!(spring_cost(n), 6 * n as u32);
             assert_eq!(solve_cost(n), 8 + 5 * n as u32 / 2);
         }
-        assert_eq!([0, 520, 5000].map(contact_room), [48, 103, MAX_CONTACTS]);
         for candidates in 0..=MAX_CONTACTS as u16 {
             assert_eq!(
                 further_solve_cost(3, candidates),

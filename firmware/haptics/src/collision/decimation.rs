@@ -8,12 +8,11 @@
 //! of a second: contacts that come and go are felt more than fewer of them.
 //!
 //! Points of edges and corners stay: of a face's inside one point stands for its neighbours, but a prism has nothing else that could touch, and without
-//! them went millimetres into its hole's walls. Where more contacts are found than the tick has room for, points inside of faces are decimated until they
-//! fit, or are few beside those of edges.
+//! them went millimetres into its hole's walls.
 
 use mortise_protocol::image::{NO_FACE, PointRecord};
 
-use crate::collision::contact::Offered;
+use crate::collision::contact::MAX_CONTACTS;
 use crate::collision::cost::Used;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Points};
@@ -56,8 +55,10 @@ pub(crate) struct Searched {
     pub used: Used,
     /// Budget, field queries.
     pub budget: u32,
-    /// Contacts that it found.
-    pub offered: Offered,
+    /// Contacts that overlap.
+    pub touching: u32,
+    /// Further overlapping contacts that the store could not hold.
+    pub lost: u32,
 }
 
 impl Decimation {
@@ -104,12 +105,17 @@ impl Decimation {
     /// Adapts the level to the outcome of a search.
     pub fn update(&mut self, searched: &Searched) {
         let overrun = self.count_overrun(searched);
-        let Searched { offered, budget, .. } = *searched;
+        let Searched {
+            touching,
+            lost,
+            budget,
+            ..
+        } = *searched;
         let point_work = searched.used.point_work;
         let calm = searched.stopped.is_none() || !helps(self.level.saturating_sub(1), 2 * point_work, budget);
         self.calm = if calm { self.calm.saturating_add(1) } else { 0 };
-        if offered.inside + offered.others > offered.room {
-            self.decimate_to_fit(offered);
+        if lost > 0 {
+            self.decimate_to_fit(touching + lost);
         } else if overrun && self.level < MAX_DECIMATION && helps(self.level, point_work, budget) {
             self.level += 1;
             self.patience = MAX_FIRST_OVERRUNS;
@@ -135,22 +141,16 @@ impl Decimation {
         overrun
     }
 
-    /// Raises the level until the contacts fill at most three quarters of the store, or those inside of faces, counted at the present level, an eighth.
+    /// Raises the level until `touching` points, counted at the present level, fill at most three quarters of the store.
     ///
     /// More points than the store holds must not touch: the selection of kept contacts would follow the last tick's tilt and tilt the part the other
     /// way, and the stiffness that comes and goes with them generates energy. A flat face on more than 256 points rattled so from tick to tick, by as
     /// much as its depth.
-    fn decimate_to_fit(&mut self, mut offered: Offered) {
-        while self.level < MAX_DECIMATION && !offered.fit() {
+    fn decimate_to_fit(&mut self, mut touching: u32) {
+        while self.level < MAX_DECIMATION && touching * 4 > MAX_CONTACTS as u32 * 3 {
             self.level += 1;
-            offered.inside /= 2;
+            touching /= 2;
         }
-    }
-}
-
-impl Offered {
-    fn fit(self) -> bool {
-        4 * (self.inside + self.others) <= 3 * self.room || 8 * self.inside <= self.room
     }
 }
 
@@ -167,8 +167,7 @@ fn has_capacity(searched: &Searched) -> bool {
     let has_capacity = |filled: u32, of: u32| 9 * filled < NINTHS * of;
     let twice = searched.used.all + searched.used.point_work;
     let fits = searched.stopped.is_some() || has_capacity(twice, searched.budget);
-    let Offered { inside, others, room } = searched.offered;
-    fits && (has_capacity(2 * inside + others, room) || 16 * inside <= room)
+    fits && has_capacity(2 * searched.touching, MAX_CONTACTS as u32)
 }
 
 #[cfg(test)]
@@ -197,20 +196,10 @@ mod tests {
                 point_work: 3 * all / 4,
             },
             budget: 500,
-            offered: offered(10, 0),
+            touching: 10,
+            lost: 0,
         }
     }
-
-    fn offered(inside: u32, others: u32) -> Offered {
-        Offered {
-            inside,
-            others,
-            room: ROOM,
-        }
-    }
-
-    /// Contacts that a tick has room for.
-    const ROOM: u32 = 256;
 
     #[test]
     fn the_first_pass_may_overrun_until_it_is_complete() {
@@ -270,11 +259,11 @@ mod tests {
             assert_eq!(o.level(), MAX_DECIMATION - steps, "{ticks}");
         }
         // Points that would not fit stay decimated.
-        let many = || Searched {
-            offered: offered(356, 0),
+        o.update(&Searched {
+            lost: 100,
+            touching: 256,
             ..sufficed(100)
-        };
-        o.update(&many());
+        });
         assert_eq!(o.level(), 1);
         for _ in 0..2 * CALM_TICKS {
             o.update(&sufficed(400));
@@ -329,20 +318,18 @@ mod tests {
     }
 
     proptest! {
-        /// For any sequence of searches at least each 128th point is queried, and points inside of faces are decimated until they fit the store.
+        /// For any sequence of searches at least each 128th point is queried, and touching points are decimated until they fit the store.
         #[test]
         fn stays_within_its_bounds(
-            ticks in prop::collection::vec((0u32..100, prop::option::of(0u32..100), 0u32..2000, 0u32..40_000, 0u32..1000), 1..300)
+            ticks in prop::collection::vec((0u32..100, prop::option::of(0u32..100), 0u32..2000, 0u32..257, 0u32..40_000), 1..300)
         ) {
             let mut o = Decimation::NEW;
-            for (start, stop, all, inside, others) in ticks {
+            for (start, stop, all, touching, lost) in ticks {
                 let before = o.level();
-                let found = offered(inside, others);
-                o.update(&Searched { start: at(start), stopped: stop.map(at), offered: found, ..sufficed(all) });
+                o.update(&Searched { start: at(start), stopped: stop.map(at), touching, lost, ..sufficed(all) });
                 prop_assert!(o.level() <= MAX_DECIMATION);
-                let inside = inside >> (o.level() - before.min(o.level()));
-                let fit = 4 * (inside + others) <= 3 * ROOM || 8 * inside <= ROOM;
-                prop_assert!(found.inside + others <= ROOM || fit || o.level() == MAX_DECIMATION);
+                let fits = 4 * ((touching + lost) >> (o.level() - before.min(o.level()))) <= 3 * MAX_CONTACTS as u32;
+                prop_assert!(lost == 0 || fits || o.level() == MAX_DECIMATION);
             }
         }
     }

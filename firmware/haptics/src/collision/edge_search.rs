@@ -57,13 +57,6 @@ const MOST_KEPT_M: f32 = 0.75e-3;
 /// and not where fewer ticks than this would use it up.
 const LEAST_KEPT_TICKS: f32 = 4.0;
 
-/// Field queries that a leaf's edges seldom exceed: where their near pairs are kept or none was near, and where these are searched for.
-const KEPT_LEAF: u32 = 24;
-/// See [`KEPT_LEAF`].
-const SEARCHED_LEAF: u32 = 96;
-/// Field queries that must be left for an entry to be made: it takes up to 90 beside the comparisons.
-const KEPT_FROM: u32 = 2 * SEARCHED_LEAF;
-
 /// Pieces of the other part's edges near a leaf, and their numbers; more are compared in groups of this size. Records, since a piece is long to copy.
 type Near<'i> = Vec<(u32, &'i EdgeRecord), NEAR_PIECES>;
 /// See [`Near`].
@@ -179,18 +172,6 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
             // As long as its bound holds, none of its pieces can touch.
             let holds = distance > self.search.margin || matches!(known, Known::Far(_));
-            if holds && self.left() < SEARCHED_LEAF {
-                // Another tick finds how long.
-                ancestors.note(match known {
-                    Known::Far(bound) if distance <= self.search.margin => bound,
-                    _ => self.coherence.set_distance(key, distance),
-                });
-                continue;
-            }
-            let queries = self.queries_of_edges(key);
-            if !holds && self.is_short_of(|| queries) {
-                return Some(here);
-            }
             let travel = if holds {
                 self.travel_to_edges(pair, node)
             } else {
@@ -207,14 +188,6 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         }
         ancestors.close(index, self.coherence);
         None
-    }
-
-    /// Field queries that the edges of a near leaf take.
-    fn queries_of_edges(&self, key: Key) -> u32 {
-        match self.coherence.cached_pairs(key, self.horizon) {
-            CachedPairs::In(_) | CachedPairs::Unknown(_) => KEPT_LEAF,
-            CachedPairs::Many | CachedPairs::Wanted(_) => SEARCHED_LEAF,
-        }
     }
 
     /// Travel within which a bound expires early, m, see [`EARLY_M`].
@@ -243,8 +216,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let cached = self.coherence.cached_pairs(key, self.horizon);
         let entry = match cached {
             CachedPairs::In(entry) => Some(entry),
-            CachedPairs::Wanted(entry) if self.left() >= KEPT_FROM => self.keep_pairs(pair, key, node, entry),
-            CachedPairs::Many | CachedPairs::Wanted(_) | CachedPairs::Unknown(_) => None,
+            CachedPairs::Wanted(entry) => self.keep_pairs(pair, key, node, entry),
+            CachedPairs::Many | CachedPairs::Unknown(_) => None,
         };
         let rest_m = match entry {
             Some(entry) => self.cross_kept(pair, leaf, node, entry),

@@ -42,10 +42,10 @@ struct Gathered {
 }
 
 /// Adds the face pairs of all pushing contacts to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes
-/// first. Returns the number of pairs whose faces were put in order, which takes most of the time.
+/// first.
 ///
 /// Contacts come in tree order, so the last pair is tried first. Cost: 30 instructions per contact, 200 per pair, and 1000 for each of the deepest [`MAX_PAIRS`].
-pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) -> u16 {
+pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) {
     let mut sides = Sides::new(at);
     let mut gathered: Vec<Gathered, MAX_GATHERED> = Vec::new();
     let mut last = 0;
@@ -88,7 +88,6 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
         }
     }
     report(&merged, pairs);
-    deepest.len() as u16
 }
 
 /// Adds the pairs to those reported, deepest first.

@@ -10,13 +10,12 @@
 //! | `span`, `span_search` | spans of sharp edges: the distance along one, and the place of it that touches |
 //! | `coherence`, `node_key`, `ancestors`, `face_cache`, `edge_cache` | advancement bounds, cached faces and near pairs of edges kept from earlier ticks |
 //! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
-//! | `cost`, `budget`, `decimation` | cost model of the work budget; what a search may still spend of it; decimation of points when it does not suffice |
+//! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
 //! | `contact`, `side`, `face_pairs` | bounded store of contacts; side from which a leaf came to a thin part; touching face pairs |
 //! | `placement`, `node_cursor` | placement of a part; position of the search in all trees |
 
 pub(crate) mod ancestors;
 mod boxes;
-mod budget;
 pub(crate) mod coherence;
 pub(crate) mod contact;
 pub mod cost;

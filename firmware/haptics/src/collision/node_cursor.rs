@@ -16,9 +16,4 @@ impl NodeCursor {
     pub fn part(self) -> u16 {
         self.pair / 2
     }
-
-    /// Whether the points are the other part's.
-    pub fn is_backward(self) -> bool {
-        self.pair % 2 == 1
-    }
 }

@@ -4,10 +4,7 @@
 //! Without the backward direction a sharp fixed rim would slip between the points of a tilted part. Both directions traverse a preorder sphere tree
 //! and skip every sphere whose distance, by the field at its centre, exceeds the margin.
 //!
-//! A tick has room for as many contacts as its budget pays for: the deepest, and those that a rotation would bring to touch first.
-//!
-//! When the budget runs out, work is dropped in this order. First, the step gets only as many solves as the budget has left, four at least. Second, a leaf
-//! that would exceed the budget is left for the next tick;
+//! When the budget runs out, work is dropped in this order. First, the step gets only as many solves as the budget has left, four at least. Second,
 //! contacts in leaves not reached that pushed, or may now, are carried over, their gaps advanced by the last motion, and the next tick resumes where this one
 //! stopped, round and round. Third, when two ticks do not complete a round (the ticks after a grab excepted), points inside of faces are decimated evenly where
 //! points are the bulk of the work: each second, fourth or eighth near point is queried where points take a quarter of the budget; where they still
@@ -26,7 +23,7 @@ use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
-    ALLOWANCE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, Used, carried_cost,
+    ALLOWANCE, CANDIDATE, LEAF, LOOKUP, MATING, NEAR, NODE, PAIR, PASSED_OVER, PUSHING, Used,
 };
 use crate::collision::decimation::Decimation;
 use crate::collision::directed_pair::DirectedPair;
@@ -86,10 +83,8 @@ pub(crate) struct Search<'s, 'i, R> {
     pub budget: u32,
     /// Part of the budget reserved for the step.
     pub reserved: u32,
-    /// Contacts carried over, which enter the step even if the search finds none: those that pushed, and others.
-    pub carried: [u32; 2],
-    /// Contacts that the tick has room for.
-    pub room: usize,
+    /// Contacts carried over, which enter the step even if the search finds none.
+    pub carried: u32,
     /// Gap below which points are braked, m; 0 for no braking. With braking, points in proximity voxels are candidates too.
     pub braking_m: f32,
     /// Rules of the constraints in force for guided faces.
@@ -129,11 +124,11 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             .pairs(start, None)
             .or_else(|| traversal.pairs(NodeCursor::FIRST, Some(start)));
         let (spent, not_found, point_work) = (traversal.spent, traversal.expected, traversal.point_work);
-        let mut carried = [0; 2];
+        let [mut carried, mut near] = [0; 2];
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET);
             let limit = |row: &[f32; 6]| self.slack + self.approach(row);
-            carried = contacts.carry(&self.motions[0], limit, |leaf| {
+            [carried, near] = contacts.carry(&self.motions[0], limit, |leaf| {
                 let visited = if start < stop {
                     start <= leaf && leaf < stop
                 } else {
@@ -142,11 +137,10 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
                 !visited
             });
         }
+        let found = self.expected() - not_found;
         let used = Used {
-            all: (spent + carried_cost(carried) - carried_cost(not_found)) / LOOKUP,
-            point_work: (point_work + carried_cost(self.expected()) + carried_cost(carried)
-                - carried_cost(not_found))
-                / LOOKUP,
+            all: (spent + PUSHING * carried + CANDIDATE * near - PUSHING * not_found) / LOOKUP,
+            point_work: (point_work + PUSHING * (found + carried) + CANDIDATE * near) / LOOKUP,
         };
         (stop, used)
     }
@@ -172,6 +166,14 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         Some(pair)
     }
 
+    /// Contacts paid for before the search. A quarter of the budget at least is left, so that every leaf's turn comes.
+    fn expected(&self) -> u32 {
+        let most = LOOKUP
+            .saturating_mul(self.budget / 4 * 3)
+            .saturating_sub(LOOKUP * self.reserved);
+        self.carried.min(most / PUSHING)
+    }
+
     /// A traversal that has not begun, with an empty contact store; with `keep_previous` the previous contacts can be carried over.
     pub fn traverse<'w>(
         &'w self,
@@ -180,7 +182,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
         contacts: &'w mut Contacts,
         work: &'w mut Work,
     ) -> Traversal<'w, 'w, 'i, R> {
-        contacts.begin(keep_previous, self.room);
+        contacts.begin(keep_previous);
         let expected = self.expected();
         Traversal {
             search: self,
@@ -188,7 +190,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             coherence,
             contacts,
             work,
-            spent: LOOKUP * self.reserved + carried_cost(expected),
+            spent: LOOKUP * self.reserved + PUSHING * expected,
             expected,
             point_work: 0,
             decimation_work: 0,
@@ -197,7 +199,6 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             face_searches: 0,
             mating_cache: MatingCache::NONE,
             near: 0,
-            has_evaluated: false,
             boxes: None,
         }
     }
@@ -219,8 +220,8 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     pub decimation_work: u32,
     /// Of that, on exclusion queries.
     pub exclusion_work: u32,
-    /// Contacts already paid for and not yet found, as [`Search::carried`].
-    pub expected: [u32; 2],
+    /// Candidates already paid for and not yet found.
+    expected: u32,
     /// Leaves whose decimated points were queried.
     pub decimated_queries: u32,
     /// Leaves whose face was searched for.
@@ -229,8 +230,6 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     mating_cache: MatingCache,
     /// Number of points within the margin.
     pub near: u32,
-    /// Whether any leaf was evaluated.
-    pub has_evaluated: bool,
     /// The last part of which the boxes were compared, and their gap, m.
     pub boxes: Option<(u16, f32)>,
 }
@@ -367,7 +366,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.note(Bound::NOW);
                 continue;
             }
-            if self.is_short_of_points(points, near & mask) {
+            // A leaf is evaluated as a whole, unless it exceeds even the whole budget.
+            if (self.left() as usize) < points.len() && self.work.points > 0 {
                 return Some(here);
             }
             self.spent += LEAF;
@@ -567,6 +567,22 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     #[inline]
     pub fn mating_of(&mut self, leaf: NodeCursor, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
         (self.mating_cache).get(self.search.rules, leaf.part(), moving, fixed)
+    }
+
+    /// Counts a candidate, a point that may touch, and charges it to the budget.
+    #[inline(always)]
+    pub fn count_candidate(&mut self) {
+        if self.expected > 0 {
+            self.expected -= 1;
+        } else {
+            self.spent += CANDIDATE;
+        }
+        self.work.candidates = self.work.candidates.saturating_add(1);
+    }
+
+    /// Budget left, field queries.
+    pub fn left(&self) -> u32 {
+        self.search.budget.saturating_sub(self.spent / LOOKUP)
     }
 }
 

@@ -10,7 +10,7 @@ use glam::Vec3;
 use mortise_protocol::image::{NO_FACE, SceneImage, Shape};
 
 use crate::collision::coherence::Coherence;
-use crate::collision::contact::{Contacts, MAX_CONTACTS, Phase};
+use crate::collision::contact::{Contacts, Phase};
 use crate::collision::decimation::Decimation;
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::node_cursor::NodeCursor;
@@ -159,8 +159,7 @@ fn resting_search<'s, 'i>(
         decimation: Decimation::NEW,
         budget: u32::MAX,
         reserved: 0,
-        carried: [0; 2],
-        room: MAX_CONTACTS,
+        carried: 0,
         braking_m: 0.0,
         rules: &NoRules,
     }
@@ -240,7 +239,7 @@ impl Prober {
         if let Some(found) = &proven {
             self.agree(found, &nearest);
         }
-        work.flags.insert_if(self.contacts.dropped() > 0, Flags::CONTACTS);
+        work.flags.insert_if(self.contacts.dropped(), Flags::CONTACTS);
         work.contacts = self.contacts.as_slice().len() as u16;
         Ok(Probe {
             nearest,
@@ -350,7 +349,7 @@ impl Prober {
     /// Makes the contacts agree with a proven distance: none where the parts are apart, at least the nearest point where they overlap.
     fn agree(&mut self, found: &Separation, nearest: &Nearest) {
         if found.distance - found.error >= 0.0 {
-            self.contacts.begin(false, MAX_CONTACTS);
+            self.contacts.begin(false);
         }
         if found.distance + found.error >= 0.0 || !self.contacts.as_slice().is_empty() {
             return;
