@@ -13,7 +13,6 @@ mod far_origins;
 mod field;
 mod finer;
 mod free_form;
-mod kept_edges;
 mod occupancy;
 mod planner;
 mod pointshell;
