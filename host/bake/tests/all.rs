@@ -1,7 +1,7 @@
 //! Integration tests of this package: one program, which is linked once.
-
 mod cell_rules;
 mod classic;
+mod coherence;
 mod common;
 mod contact_sampling;
 mod convex_probe;

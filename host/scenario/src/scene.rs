@@ -2,11 +2,12 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Duration;
 
 use glam::{DAffine3, DVec3};
 use mortise_bake::{
-    BakeError, BakeOptions, BakeReport, ExactSurface, Grabbable, PointshellOptions, Request, bake, plan,
-    sample_pointshell,
+    BakeError, BakeOptions, BakeReport, Effort, ExactSurface, Grabbable, NoCache, PointshellOptions, Request,
+    bake, plan_within, sample_pointshell,
 };
 use mortise_brep::{CadModel, load_step};
 use mortise_guide::{Guide, GuideSettings};
@@ -93,14 +94,19 @@ impl PreparedScene {
         Self::of_image(step, model, part, baked.image, baked.report)
     }
 
-    /// As [`Self::bake`], but planned: the smallest image within `request`'s accuracy.
+    /// As [`Self::bake`], but planned: the smallest image within `request`'s accuracy. The work ends a plan, never the clock: else a machine that does other
+    /// things as well would play another scene.
     ///
     /// # Errors
     /// `Bake`, `NoSuchPart`.
     pub fn plan(step: &Path, model: CadModel, part: &str, request: &Request) -> Result<Self, ScenarioError> {
         named(step, &model, part)?;
-        let planned =
-            plan(&model, request, &|_| ControlFlow::Continue(())).map_err(|source| refused(step, source))?;
+        let effort = Effort {
+            time: Duration::MAX,
+            ..Effort::default()
+        };
+        let planned = plan_within(&model, request, effort, &NoCache, &|_| ControlFlow::Continue(()))
+            .map_err(|source| refused(step, source))?;
         Self::of_image(step, model, part, planned.image, planned.plan.report)
     }
 

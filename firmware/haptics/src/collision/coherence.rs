@@ -14,6 +14,7 @@
 //!
 //! Cost: some 25 instructions for a node with a valid entry, against some 200 for a field query.
 
+use crate::collision::edge_cache::{CachedPairs, EdgeCache, Entry, PiecePair};
 use crate::collision::face_cache::{CachedFace, FaceCache};
 use crate::collision::node_key::{ALL, Key, Points, SLOTS};
 
@@ -31,7 +32,7 @@ const QUERY_AGAIN: u32 = 16;
 /// Flag in the bound of a leaf that is far by its points although its sphere is not: when the bound expires, the points are evaluated directly.
 const BY_POINTS: u32 = 1;
 
-/// Advancement bounds of nodes, and cached faces.
+/// Advancement bounds of nodes, cached faces, and near pairs of pieces of edges.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Coherence {
@@ -44,6 +45,7 @@ pub(crate) struct Coherence {
     epoch: u16,
     slots: [Slot; SLOTS],
     face_cache: FaceCache,
+    edge_cache: EdgeCache,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -103,6 +105,7 @@ impl Coherence {
             epoch: 0,
             slots: [Slot::EMPTY; SLOTS],
             face_cache: FaceCache::new(),
+            edge_cache: EdgeCache::new(),
         }
     }
 
@@ -118,11 +121,20 @@ impl Coherence {
     fn add_travel(&mut self, nm: u32) {
         self.travel_nm = self.travel_nm.saturating_add(nm);
         if self.travel_nm > LONGEST_NM {
-            // In place: a new table would be built on the stack, which has no space for many of them.
-            (self.travel_nm, self.invalidated_nm, self.epoch) = (0, 0, 0);
-            self.slots.fill(Slot::EMPTY);
-            self.face_cache.clear();
+            self.clear();
         }
+    }
+
+    /// Resets the travel, and voids all entries by their tags: a third of the instructions of zeroing all of the table.
+    #[cold]
+    #[inline(never)]
+    fn clear(&mut self) {
+        (self.travel_nm, self.invalidated_nm, self.epoch) = (0, 0, 0);
+        for slot in &mut self.slots {
+            slot.tag = Slot::EMPTY.tag;
+        }
+        self.face_cache.clear();
+        self.edge_cache.clear();
     }
 
     /// Adds the object's motion: no point moved by more than `distance` m.
@@ -224,6 +236,11 @@ impl Coherence {
         self.face_cache.get(leaf, which, self.travel_nm)
     }
 
+    /// The travel for which the cached face of a leaf holds, m: beyond so much there may be others.
+    pub fn cached_face_rest(&self, leaf: Key) -> f32 {
+        rest_m(self.face_cache.until(leaf), self.travel_nm)
+    }
+
     /// Caches the one face within `distance` m of the selected points of a leaf, or `None` where there is more than one.
     pub fn cache_face(&mut self, leaf: Key, which: Points, face: Option<u16>, distance: f32) {
         if !leaf.is_none() {
@@ -231,6 +248,52 @@ impl Coherence {
             let Bound(until_nm) = self.bound_after(leaf, distance);
             self.face_cache.set(leaf, which, face, until_nm);
         }
+    }
+
+    /// What is known of the edges of a leaf up to the `horizon` (see [`Self::horizon`]).
+    #[inline]
+    pub fn cached_pairs(&self, leaf: Key, horizon: u32) -> CachedPairs {
+        if leaf.is_none() {
+            CachedPairs::Many
+        } else {
+            self.edge_cache.get(leaf, self.travel_nm, horizon)
+        }
+    }
+
+    /// Begins an entry for a leaf of whose edges no pairs but those added can touch within a travel of `distance` m past the `horizon`.
+    pub fn begin_pairs(&mut self, entry: Entry, leaf: Key, horizon: u32, distance: f32) {
+        (self.edge_cache).begin(entry, leaf, Self::bound_past(leaf, horizon, distance));
+    }
+
+    /// Reserves a free entry for a leaf with near edges, for a travel of `distance` m past the `horizon`.
+    pub fn want_pairs(&mut self, entry: Entry, leaf: Key, horizon: u32, distance: f32) {
+        (self.edge_cache).want(entry, leaf, Self::bound_past(leaf, horizon, distance));
+    }
+
+    /// Adds a pair to an entry, see [`EdgeCache::push`].
+    pub fn add_pair(&mut self, entry: Entry, own: usize, other: u32) -> bool {
+        self.edge_cache.push(entry, own, other)
+    }
+
+    /// Number of pairs of an entry.
+    pub fn pairs(&self, entry: Entry) -> usize {
+        self.edge_cache.len(entry)
+    }
+
+    /// The first pair of an entry from number `from` on that may touch before the `horizon`, and its number.
+    #[inline]
+    pub fn next_pair(&self, entry: Entry, from: usize, horizon: u32) -> Option<(usize, PiecePair)> {
+        self.edge_cache.next(entry, from, horizon)
+    }
+
+    /// Notes that a pair of a leaf's entry cannot touch within a travel of `distance` m past the `horizon`.
+    pub fn rest_pair(&mut self, entry: Entry, number: usize, leaf: Key, horizon: u32, distance: f32) {
+        (self.edge_cache).rest(entry, number, Self::bound_past(leaf, horizon, distance));
+    }
+
+    /// The travel within which nothing of an entry can touch, m.
+    pub fn pairs_rest(&self, entry: Entry) -> f32 {
+        rest_m(self.edge_cache.until(entry), self.travel_nm)
     }
 
     /// Voids all exclusion entries; for when any exclusion has ended.
@@ -247,9 +310,15 @@ impl Coherence {
     /// Travel at which the node's share of `distance` m is used up.
     #[inline]
     fn bound_after(&self, key: Key, distance: f32) -> Bound {
+        Bound(Self::bound_past(key, self.travel_nm, distance))
+    }
+
+    /// The same, counted from a travel `from`, nm.
+    #[inline]
+    fn bound_past(key: Key, from: u32, distance: f32) -> u32 {
         // A float that is negative or not a number becomes 0, a huge one the largest number.
         let ahead = (distance * (key.share() * 1e9)) as u32;
-        Bound(self.travel_nm + smaller_of(ahead, FARTHEST_NM))
+        from.saturating_add(smaller_of(ahead, FARTHEST_NM))
     }
 
     #[inline]
@@ -263,6 +332,12 @@ impl Coherence {
 
 fn smaller_of(a: u32, b: u32) -> u32 {
     if b < a { b } else { a }
+}
+
+/// What is left of a travel up to `until`, m.
+fn rest_m(until_nm: u32, travel_nm: u32) -> f32 {
+    // Rounded down by more than the product's error.
+    until_nm.saturating_sub(travel_nm) as f32 * (0.999_999 * 1e-9)
 }
 
 /// Nanometres, rounded up past any rounding of the single-precision product.

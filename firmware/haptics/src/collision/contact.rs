@@ -225,9 +225,12 @@ impl Contacts {
         let mut carried = [0; 2];
         for i in 0..self.carried_len {
             let old = &self.lists[1 - self.current][i];
+            if !unvisited(old.leaf) {
+                continue;
+            }
             let gap = old.gap + dot(&old.row, motion);
             let is_free = old.phase == Phase::Free;
-            if !unvisited(old.leaf) || is_free && gap >= limit(&old.row) {
+            if is_free && gap >= limit(&old.row) {
                 continue;
             }
             let (reach_gap, arm2) = (old.reach_gap, old.arm.length_squared());

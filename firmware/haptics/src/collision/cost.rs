@@ -93,8 +93,12 @@ costs! {
     CIRCLE = 190;
     /// Bound of the travel until two circles cross.
     CIRCLE_PAIR = 67;
+    /// Pair of pieces of edges that is kept for a leaf.
+    KEPT_PAIR = 24;
+    /// Step to the common perpendicular of two pieces of edges.
+    FEET_STEP = 95;
     /// Contact of two pieces of edges.
-    CROSSING = 380;
+    CROSSING = 285;
     /// Fixed cost of a search for the travel until a leaf's edges may touch.
     EDGE_TRAVEL = 760;
     /// Setting up a target's spring and what depends on it, without its cost in a solve.
@@ -179,7 +183,9 @@ mod tests {
                 ("EDGE_PAIR", 3),
                 ("CIRCLE", 8),
                 ("CIRCLE_PAIR", 3),
-                ("CROSSING", 16),
+                ("KEPT_PAIR", 1),
+                ("FEET_STEP", 4),
+                ("CROSSING", 12),
                 ("EDGE_TRAVEL", 32),
                 ("SPRING", 48),
                 ("SOLVE", 64),

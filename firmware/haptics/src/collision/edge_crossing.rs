@@ -11,7 +11,7 @@
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{EdgeRecord, oct_decode};
 
-use crate::math::scalar::inverse_sqrt;
+use crate::math::scalar::{inverse_sqrt, larger, smaller};
 use crate::math::vector::quick_length;
 
 /// Sine of the smallest angle between edges that cross. Points along the edges find those more nearly parallel: halfway between two points 5 mm apart
@@ -79,12 +79,6 @@ impl<'a> Piece<'a> {
         self.half + self.bend * (2.0 * t)
     }
 
-    /// Whether its sphere and another one (centre, radius, m) are at most `reach` apart.
-    #[inline]
-    pub fn is_within(&self, center: Vec3, radius: f32, reach: f32) -> bool {
-        are_within((self.center, self.record.radius), (center, radius), reach)
-    }
-
     /// Whether it and a sphere (centre, radius, m) are at most `reach` apart, by its segment: a long piece is not near all that its own sphere contains.
     #[inline]
     pub fn is_near(&self, (center, radius): (Vec3, f32), reach: f32) -> bool {
@@ -100,9 +94,13 @@ impl<'a> Piece<'a> {
         (self.center, self.record.radius)
     }
 
-    /// Outward normals of its two faces, turned by `rotation`; not normalised.
-    fn normals(&self, rotation: &Mat3) -> [Vec3; 2] {
-        (self.record.normals).map(|n| *rotation * Vec3::from_array(oct_decode(n)))
+    /// Outward unit normals of its two faces across a unit tangent `along`, turned by `rotation`.
+    fn normals(&self, rotation: &Mat3, along: Vec3) -> [Vec3; 2] {
+        (self.record.normals).map(|n| {
+            let normal = *rotation * Vec3::from_array(oct_decode(n));
+            let across = normal - along * normal.dot(along);
+            across * inverse_sqrt(across.length_squared() + f32::MIN_POSITIVE)
+        })
     }
 }
 
@@ -113,17 +111,13 @@ pub(crate) fn are_within(a: (Vec3, f32), b: (Vec3, f32), reach: f32) -> bool {
     (a.0 - b.0).length_squared() <= farthest * farthest
 }
 
-/// Whether `n` lies in the cone between the `normals` of the two faces at an edge of tangent `along`, within [`CONE_SINE`].
-fn in_cone(normals: [Vec3; 2], along: Vec3, n: Vec3) -> bool {
-    let unit = along * inverse_sqrt(along.length_squared());
-    let across = |v: Vec3| {
-        let flat = v - unit * v.dot(unit);
-        flat * inverse_sqrt(flat.length_squared() + f32::MIN_POSITIVE)
-    };
-    let [a, b] = normals.map(across);
-    let sense = if a.cross(b).dot(unit) < 0.0 { -1.0 } else { 1.0 };
-    let (past_a, before_b) = (a.cross(n).dot(unit) * sense, n.cross(b).dot(unit) * sense);
-    past_a > -CONE_SINE && before_b > -CONE_SINE && n.dot(a + b) > 0.0
+/// Sine, or less, of the angle by which `n` lies outside of the cone between the `normals` of the two faces at an edge of unit tangent `along`, or on the far side of
+/// it; not positive inside of it, within [`CONE_SINE`].
+fn outside(normals: [Vec3; 2], along: Vec3, n: Vec3) -> f32 {
+    let [a, b] = normals;
+    let sense = if a.cross(b).dot(along) < 0.0 { -1.0 } else { 1.0 };
+    let (past_a, before_b) = (a.cross(n).dot(along) * sense, n.cross(b).dot(along) * sense);
+    larger(-CONE_SINE - smaller(past_a, before_b), -0.5 * n.dot(a + b))
 }
 
 /// `above`/`below`, at least −1 and at most 1; `below` is not negative.
@@ -230,64 +224,114 @@ pub(crate) struct Crossing {
     pub sine: f32,
 }
 
-/// Contact of the piece `own`, turned by `rotation` into this frame, with the piece `other` of the field's part; `None` where they do not cross,
-/// hardly cross, or do not face each other. The search starts at the parameters `from`, those of the [`nearest`] points of their segments.
-pub(crate) fn crossing(
-    own: &Piece<'_>,
-    other: &Piece<'_>,
-    rotation: &Mat3,
-    from: [f32; 2],
-) -> Option<Crossing> {
+/// What [`crossing`] found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Meeting {
+    /// They cross.
+    Crossing(Crossing),
+    /// They do not face each other, and cannot before one turns against the other by this angle, rad.
+    Averted(f32),
+    /// They do not cross, or hardly.
+    Beside,
+}
+
+/// Parameters of the feet of the common perpendicular of two pieces, searched from the parameters `from`, those of the [`nearest`] points of their segments. Where
+/// it is beyond their ends, or they hardly cross, the travel within which that remains so, m, at most 0 where it is not known; `turn` is the most by which the
+/// held part turns over any way, 1/m.
+#[inline]
+pub(crate) fn feet(own: &Piece<'_>, other: &Piece<'_>, from: [f32; 2], turn: f32) -> Result<[f32; 2], f32> {
     let [mut t, mut s] = from;
-    let steps = if own.straight && other.straight { 1 } else { STEPS };
-    let least = if own.straight || other.straight {
-        LEAST_SINE * LEAST_SINE
-    } else {
-        LEAST_SINE_OF_CURVES * LEAST_SINE_OF_CURVES
-    };
-    for _ in 0..steps {
+    let least = least_sine2(own, other);
+    let straight = own.straight && other.straight;
+    let mut share2 = 0.0;
+    for _ in 0..feet_steps(own, other) {
         let (d, e) = (own.tangent(t), other.tangent(s));
         let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
         let sine2 = dd * ee - de * de;
         if sine2 <= least * dd * ee {
-            return None;
+            return Err(0.0);
         }
         let apart = own.at(t) - other.at(s);
         let inverse = 1.0 / sine2;
         let (da, ea) = (d.dot(apart), e.dot(apart));
         t += (de * ea - ee * da) * inverse;
         s += (dd * ea - de * da) * inverse;
+        share2 = sine2 / (dd * ee);
         // Far past the ends the quadratic is no longer the edge.
-        if !(t.abs() <= 2.0 && s.abs() <= 2.0) {
-            return None;
+        if !(straight || t.abs() <= 2.0 && s.abs() <= 2.0) {
+            return Err(0.0);
         }
     }
-    let past_end = |t: f32, piece: &Piece<'_>| (t.abs() - 1.0) * piece.record.radius > PAST_END_M;
-    if past_end(t, own) || past_end(s, other) {
-        return None;
+    let past = |t: f32, piece: &Piece<'_>| (t.abs() - 1.0) * piece.record.radius - PAST_END_M;
+    let past = larger(past(t, own), past(s, other));
+    if past <= 0.0 {
+        return Ok([t, s]);
     }
+    // A foot moves by the travel over the sine of the angle, by a quarter more where it lies beyond the part, and by another where the edges are apart and turn.
+    let apart2 = (own.at(t) - other.at(s)).length_squared();
+    let is_known = straight && 16.0 * apart2 * turn * turn < share2;
+    Err(if is_known {
+        0.5 * smaller(past, 0.25 / turn) * root(share2)
+    } else {
+        0.0
+    })
+}
+
+/// Steps that [`feet`] takes at most.
+#[inline]
+pub(crate) fn feet_steps(own: &Piece<'_>, other: &Piece<'_>) -> usize {
+    if own.straight && other.straight { 1 } else { STEPS }
+}
+
+/// Square of the sine of the smallest angle at which two pieces cross.
+#[inline]
+fn least_sine2(own: &Piece<'_>, other: &Piece<'_>) -> f32 {
+    if own.straight || other.straight {
+        LEAST_SINE * LEAST_SINE
+    } else {
+        LEAST_SINE_OF_CURVES * LEAST_SINE_OF_CURVES
+    }
+}
+
+/// Contact of the piece `own`, turned by `rotation` into this frame, with the piece `other` of the field's part, at the [`feet`] of their common
+/// perpendicular.
+pub(crate) fn crossing(own: &Piece<'_>, other: &Piece<'_>, rotation: &Mat3, [t, s]: [f32; 2]) -> Meeting {
     let (d, e) = (own.tangent(t), other.tangent(s));
     let across = d.cross(e);
-    let (squared, lengths2) = (across.length_squared(), d.length_squared() * e.length_squared());
-    if squared <= least * lengths2 {
-        return None;
+    let lengths2 = [d.length_squared(), e.length_squared()];
+    let squared = across.length_squared();
+    if squared <= least_sine2(own, other) * lengths2[0] * lengths2[1] {
+        return Meeting::Beside;
     }
     let unit = across * inverse_sqrt(squared);
-    let cones = [own.normals(rotation), other.normals(&Mat3::IDENTITY)];
-    let faces = |n: Vec3| in_cone(cones[1], e, n) && in_cone(cones[0], d, -n);
-    let normal = [unit, -unit].into_iter().find(|&n| faces(n))?;
+    let [along, other_along] = [d * inverse_sqrt(lengths2[0]), e * inverse_sqrt(lengths2[1])];
+    let sine = squared * inverse_sqrt(squared) * inverse_sqrt(lengths2[0]) * inverse_sqrt(lengths2[1]);
+    let cone = other.normals(&Mat3::IDENTITY, other_along);
+    // The other sense points away from the middle of the cone.
+    let middle = 0.5 * unit.dot(cone[0] + cone[1]);
+    let normal = if middle < 0.0 { -unit } else { unit };
+    let off = larger(
+        outside(cone, other_along, normal),
+        outside(own.normals(rotation, along), along, -normal),
+    );
+    if off >= 0.0 {
+        // Neither sense may come to lie in both cones. The normal turns by the angle of the edges over its sine, which falls by as much.
+        let off = smaller(off, middle.abs());
+        let still = own.straight && other.straight;
+        return Meeting::Averted(if still { off * sine / (1.0 + off) } else { 0.0 });
+    }
     let point = own.at(t);
     let apart = point - other.at(s);
     let gap = normal.dot(apart);
     // Curves that pass beside each other have no common perpendicular here, and the steps do not converge.
     if (apart - normal * gap).length_squared() > BESIDE_M * BESIDE_M {
-        return None;
+        return Meeting::Beside;
     }
-    Some(Crossing {
+    Meeting::Crossing(Crossing {
         gap,
         normal,
         point,
-        sine: squared * inverse_sqrt(squared) * inverse_sqrt(lengths2),
+        sine,
     })
 }
 
@@ -308,10 +352,20 @@ mod tests {
         }
     }
 
-    fn crossing(own: &EdgeRecord, other: &EdgeRecord) -> Option<Crossing> {
+    fn meeting(own: &EdgeRecord, other: &EdgeRecord) -> Meeting {
         let [own, other] = [own, other].map(Piece::fixed);
-        let (from, distance) = nearest(&own, &other);
-        let found = super::crossing(&own, &other, &Mat3::IDENTITY, from)?;
+        let (from, _) = nearest(&own, &other);
+        feet(&own, &other, from, 1.0).map_or(Meeting::Beside, |feet| {
+            super::crossing(&own, &other, &Mat3::IDENTITY, feet)
+        })
+    }
+
+    fn crossing(own: &EdgeRecord, other: &EdgeRecord) -> Option<Crossing> {
+        let Meeting::Crossing(found) = meeting(own, other) else {
+            return None;
+        };
+        let [own, other] = [own, other].map(Piece::fixed);
+        let (_, distance) = nearest(&own, &other);
         assert!(distance <= found.gap.abs() + 1e-8, "{distance} {found:?}");
         Some(found)
     }
@@ -390,11 +444,7 @@ mod tests {
                 [0.0; 3],
                 [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
             );
-            let crosses = |piece: &EdgeRecord| {
-                let [own, other] = [piece, &other].map(Piece::fixed);
-                let (from, _) = nearest(&own, &other);
-                super::crossing(&own, &other, &Mat3::IDENTITY, from).is_some()
-            };
+            let crosses = |piece: &EdgeRecord| matches!(meeting(piece, &other), Meeting::Crossing(_));
             assert!(pieces.iter().any(crosses), "{x}");
         }
     }
@@ -422,12 +472,7 @@ mod tests {
                 );
                 let center = Vec3::new(0.02 + beside, 0.0, -1e-6);
                 let other = arc(center, 3.0, [[0.0, 0.0, 1.0], [-0.99, 0.14, 0.0]]);
-                let [own, other] = [&own, &other].map(Piece::fixed);
-                let (from, _) = nearest(&own, &other);
-                assert!(
-                    super::crossing(&own, &other, &Mat3::IDENTITY, from).is_none(),
-                    "{beside} {turn}"
-                );
+                assert!(crossing(&own, &other).is_none(), "{beside} {turn}");
             }
         }
     }

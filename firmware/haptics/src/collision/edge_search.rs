@@ -2,7 +2,8 @@
 //!
 //! The tree of the held part's pieces is traversed as the pointshell's is: a node whose sphere the other part's field shows to be far is skipped, and
 //! its advancement bound stored. A piece of a near leaf is compared with the pieces under the other part's edge tree. A leaf that lies on the other
-//! part's surface but far from its edges, such as the rim of a peg in its bore, keeps that distance as its bound.
+//! part's surface but far from its edges, such as the rim of a peg in its bore, keeps that distance as its bound. Of a leaf that stays near edges, the pairs of
+//! pieces that can come near are kept ([`super::edge_cache`]), each with the travel within which it cannot touch.
 //!
 //! Two edges that cross are offered as a contact at any gap within the margin, so a fast edge is stopped before it passes another. An overlap deeper
 //! than [`DEPTH_SHARE`] of the thinner part is not taken for a contact unless the same edges crossed in the tick before: else the far edges of a
@@ -15,11 +16,14 @@ use mortise_protocol::image::{EDGE_ERROR_CELLS, EdgeRecord, NodeRecord};
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
 use crate::collision::cost::{
-    CIRCLE, CIRCLE_PAIR, CROSSING, EDGE_BOUND, EDGE_NODE, EDGE_PAIR, EDGE_TRAVEL, LOOKUP, MATING, NODE,
-    PASSED_OVER, PIECE, PIECE_BOUND,
+    CIRCLE, CIRCLE_PAIR, CROSSING, EDGE_BOUND, EDGE_NODE, EDGE_PAIR, EDGE_TRAVEL, FEET_STEP, KEPT_PAIR,
+    LOOKUP, MATING, NODE, PASSED_OVER, PIECE, PIECE_BOUND,
 };
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::edge_crossing::{Circle, Crossing, Piece, are_within, crossing, nearest, run_along};
+use crate::collision::edge_cache::{CachedPairs, Entry};
+use crate::collision::edge_crossing::{
+    Circle, Crossing, Meeting, Piece, are_within, crossing, feet, feet_steps, nearest, run_along,
+};
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::Key;
 use crate::collision::rules::{FacePairRules, Mating};
@@ -44,10 +48,44 @@ const EARLY_M: f32 = 0.25e-3;
 /// See [`EARLY_M`]; a power of two.
 const EARLY_TICKS: u32 = 8;
 
-/// Pieces of the other part's edges near a leaf; more are compared in groups of this size.
-type Near<'i> = Vec<Piece<'i>, NEAR_PIECES>;
+/// Near pairs of pieces are kept for this travel, m, and for [`KEPT_TICKS`] ticks of the last motion,
+const KEPT_M: f32 = 0.25e-3;
+/// See [`KEPT_M`].
+const KEPT_TICKS: f32 = 16.0;
+/// but for no more than this, m: the farther, the more pairs,
+const MOST_KEPT_M: f32 = 0.75e-3;
+/// and not where fewer ticks than this would use it up.
+const LEAST_KEPT_TICKS: f32 = 4.0;
+
+/// Pieces of the other part's edges near a leaf, and their numbers; more are compared in groups of this size. Records, since a piece is long to copy.
+type Near<'i> = Vec<(u32, &'i EdgeRecord), NEAR_PIECES>;
 /// See [`Near`].
 const NEAR_PIECES: usize = 16;
+
+/// Whether the sphere about a piece and another one (centre, radius, m) are at most `reach` apart.
+#[inline]
+fn is_within(piece: &EdgeRecord, center: Vec3, radius: f32, reach: f32) -> bool {
+    are_within(
+        (Vec3::from_array(piece.center), piece.radius),
+        (center, radius),
+        reach,
+    )
+}
+
+/// What was found of two pieces, and what tells when they can touch.
+#[derive(Clone, Copy)]
+enum Compared {
+    /// Farther apart than edges are compared: their distance, m.
+    Far(f32),
+    /// Rims that run along each other: their distance, m.
+    Along(f32),
+    /// Edges that cross: their gap, m.
+    Crossing(f32),
+    /// Edges that do not face each other before one turns by this angle, rad.
+    Averted(f32),
+    /// Edges that pass beside each other within this travel, m.
+    Beside(f32),
+}
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Searches the edges of a forward pair; nodes are numbered on from the pointshell's. Returns where it stopped when the budget ran out.
@@ -174,25 +212,127 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         node: &NodeRecord,
         lasting: bool,
     ) -> f32 {
-        let reach = self.search.margin + DEEPEST_M;
-        let mut near = Near::new();
-        let mut any_near = false;
-        self.near_edges(pair, node, reach, |search, other| {
-            // Emptied when full, so there is space.
-            let _ = near.push(other);
-            if near.is_full() {
-                any_near |= search.cross(pair, leaf, node, &near);
-                near.clear();
+        let key = pair.keys.of(leaf.node);
+        let cached = self.coherence.cached_pairs(key, self.horizon);
+        let entry = match cached {
+            CachedPairs::In(entry) => Some(entry),
+            CachedPairs::Wanted(entry) => self.keep_pairs(pair, key, node, entry),
+            CachedPairs::Many | CachedPairs::Unknown(_) => None,
+        };
+        let rest_m = match entry {
+            Some(entry) => self.cross_kept(pair, leaf, node, entry),
+            None if self.cross_all(pair, leaf, node) => {
+                if let CachedPairs::Unknown(entry) = cached {
+                    (self.coherence).want_pairs(entry, key, self.horizon, KEPT_M);
+                }
+                0.0
             }
-        });
-        if !near.is_empty() {
-            any_near |= self.cross(pair, leaf, node, &near);
-        }
-        if any_near || !lasting || self.left() == 0 {
+            None => f32::INFINITY,
+        };
+        if rest_m > self.search.margin && lasting && self.left() > 0 {
+            // Lasts longer than the entry.
+            self.travel_to_edges(pair, node)
+        } else if rest_m == f32::INFINITY {
             0.0
         } else {
-            self.travel_to_edges(pair, node)
+            rest_m
         }
+    }
+
+    /// Makes an entry of the edge cache: the pairs of pieces that can touch within some travel. `None` where there are too many, or the travel would soon be
+    /// used up.
+    fn keep_pairs(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        key: Key,
+        node: &NodeRecord,
+        entry: Entry,
+    ) -> Option<Entry> {
+        let way = self.search.way;
+        let kept_m = smaller(KEPT_M + KEPT_TICKS * way, MOST_KEPT_M);
+        if kept_m < LEAST_KEPT_TICKS * way {
+            return None;
+        }
+        let reach = self.reach() + kept_m;
+        self.coherence.begin_pairs(entry, key, self.horizon, kept_m);
+        let mut has_space = true;
+        self.near_groups(pair, node, reach, |search, near| {
+            has_space = has_space && search.keep_near(pair, node, entry, near, reach);
+        });
+        has_space.then_some(entry)
+    }
+
+    /// Adds the pairs of pieces of a leaf and `near` ones of the other part that are at most `reach` (m) apart to an entry. Returns whether there was space for
+    /// them.
+    fn keep_near(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        node: &NodeRecord,
+        entry: Entry,
+        near: &[(u32, &EdgeRecord)],
+        reach: f32,
+    ) -> bool {
+        let rotation = pair.to_field.rotation();
+        for (own_number, record) in node.points(pair.edges.pieces).iter().enumerate() {
+            let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
+            let (center, radius) = own.sphere();
+            self.spent += PIECE + EDGE_BOUND * near.len() as u32;
+            for (number, other) in near {
+                if is_within(other, center, radius, reach)
+                    && self.is_near(&own, other, reach)
+                    && !self.coherence.add_pair(entry, own_number, *number)
+                {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Compares the pairs of an entry that may touch and offers their contacts. Returns what the object must travel until any of them can touch, m.
+    fn cross_kept(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        node: &NodeRecord,
+        entry: Entry,
+    ) -> f32 {
+        let rotation = pair.to_field.rotation();
+        let records = node.points(pair.edges.pieces);
+        self.spent += KEPT_PAIR * self.coherence.pairs(entry) as u32;
+        let mut from = 0;
+        while let Some((number, kept)) = self.coherence.next_pair(entry, from, self.horizon) {
+            from = number + 1;
+            let other = pair.field_edges.pieces.get(usize::from(kept.other));
+            let Some((record, other)) = records.get(usize::from(kept.own)).zip(other) else {
+                continue;
+            };
+            self.spent += PIECE;
+            let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
+            let other = Piece::fixed(other);
+            let compared = self.compare(pair, leaf, &own, &other);
+            let rest_m = self.rest_m(&own, &other, compared);
+            if rest_m > self.search.margin {
+                let beyond_m = rest_m - self.search.margin;
+                let key = pair.keys.of(leaf.node);
+                (self.coherence).rest_pair(entry, number, key, self.horizon, beyond_m);
+            }
+        }
+        self.coherence.pairs_rest(entry)
+    }
+
+    /// Compares all pieces of a leaf with those near it and offers their contacts. Returns whether any may touch before long.
+    fn cross_all(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, node: &NodeRecord) -> bool {
+        let mut any_near = false;
+        self.near_groups(pair, node, self.reach(), |search, near| {
+            any_near |= search.cross(pair, leaf, node, near);
+        });
+        any_near
+    }
+
+    /// Distance within which pieces are compared, m.
+    fn reach(&self) -> f32 {
+        self.search.margin + DEEPEST_M
     }
 
     /// What the object must travel until the pieces of a leaf can touch an edge of the other part, m: a lower bound that is to last for a while, at most
@@ -200,17 +340,35 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     #[inline(never)]
     fn travel_to_edges(&mut self, pair: &DirectedPair<'_>, node: &NodeRecord) -> f32 {
         let reserve = self.search.margin + DEEPEST_M + RESERVE_M + RESERVE_TICKS * self.search.way;
-        let mut near = Near::new();
         let mut least = reserve;
         self.spent += EDGE_TRAVEL;
-        self.near_edges(pair, node, reserve, |search, other| {
+        self.near_groups(pair, node, reserve, |search, near| {
+            least = search.clear(pair, node, near, least);
+        });
+        least - DEEPEST_M
+    }
+
+    /// Passes to `visit` all pieces of the other part's edges whose spheres lie within `reach` (m) of a leaf's sphere, in groups.
+    #[inline(always)]
+    fn near_groups<'i>(
+        &mut self,
+        pair: &DirectedPair<'i>,
+        node: &NodeRecord,
+        reach: f32,
+        mut visit: impl FnMut(&mut Self, &[(u32, &'i EdgeRecord)]),
+    ) {
+        let mut near = Near::new();
+        self.near_edges(pair, node, reach, |search, other| {
+            // Emptied when full, so there is space.
             let _ = near.push(other);
             if near.is_full() {
-                least = search.clear(pair, node, &near, least);
+                visit(search, &near);
                 near.clear();
             }
         });
-        self.clear(pair, node, &near, least) - DEEPEST_M
+        if !near.is_empty() {
+            visit(self, &near);
+        }
     }
 
     /// Passes to `visit` every piece of the other part's edges whose sphere lies within `reach` (m) of a leaf's sphere.
@@ -220,7 +378,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         pair: &DirectedPair<'i>,
         leaf: &NodeRecord,
         reach: f32,
-        mut visit: impl FnMut(&mut Self, Piece<'i>),
+        mut visit: impl FnMut(&mut Self, (u32, &'i EdgeRecord)),
     ) {
         let (center, radius) = (pair.to_field.apply(leaf.center), leaf.radius);
         let tree = pair.field_edges;
@@ -236,14 +394,10 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             if node.skip != index {
                 continue;
             }
-            for record in node.points(tree.pieces) {
+            for (number, record) in (node.first_point..).zip(node.points(tree.pieces)) {
                 self.spent += EDGE_BOUND;
-                if are_within(
-                    (Vec3::from_array(record.center), record.radius),
-                    (center, radius),
-                    reach,
-                ) {
-                    visit(self, Piece::fixed(record));
+                if is_within(record, center, radius, reach) {
+                    visit(self, (number, record));
                 }
             }
         }
@@ -255,39 +409,64 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         pair: &DirectedPair<'_>,
         leaf: NodeCursor,
         node: &NodeRecord,
-        near: &[Piece<'_>],
+        near: &[(u32, &EdgeRecord)],
     ) -> bool {
         let rotation = pair.to_field.rotation();
-        let reach = self.search.margin + DEEPEST_M;
+        let reach = self.reach();
         let mut any_near = false;
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
             self.spent += PIECE + EDGE_BOUND * near.len() as u32;
-            for other in near {
-                if !other.is_within(center, radius, reach) || !self.is_near(&own, other, reach) {
+            for (_, other) in near {
+                if !is_within(other, center, radius, reach) || !self.is_near(&own, other, reach) {
                     continue;
                 }
-                self.spent += EDGE_PAIR;
-                let (from, distance) = nearest(&own, other);
-                if distance > reach || run_along(&own, other, from) {
-                    continue;
-                }
-                any_near = true;
-                self.spent += CROSSING;
-                if let Some(found) = crossing(&own, other, rotation, from) {
-                    self.touch(pair, leaf, [record, other.record], &found);
-                }
+                let compared = self.compare(pair, leaf, &own, &Piece::fixed(other));
+                any_near |= !matches!(compared, Compared::Far(_) | Compared::Along(_));
             }
         }
         any_near
     }
 
+    /// Offers the crossing of two pieces.
+    #[inline]
+    fn compare(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        own: &Piece<'_>,
+        other: &Piece<'_>,
+    ) -> Compared {
+        self.spent += EDGE_PAIR;
+        let (from, distance) = nearest(own, other);
+        if distance > self.reach() {
+            return Compared::Far(distance);
+        }
+        if run_along(own, other, from) {
+            return Compared::Along(distance);
+        }
+        self.spent += FEET_STEP * feet_steps(own, other) as u32;
+        let feet = match feet(own, other, from, self.most_turn()) {
+            Ok(feet) => feet,
+            Err(rest_m) => return Compared::Beside(rest_m),
+        };
+        self.spent += CROSSING;
+        match crossing(own, other, pair.to_field.rotation(), feet) {
+            Meeting::Crossing(found) => {
+                self.touch(pair, leaf, [own.record, other.record], &found);
+                Compared::Crossing(found.gap)
+            }
+            Meeting::Averted(angle) => Compared::Averted(angle),
+            Meeting::Beside => Compared::Beside(0.0),
+        }
+    }
+
     /// Whether a piece is at most `reach` (m) apart from the sphere about another one.
     #[inline]
-    fn is_near(&mut self, own: &Piece<'_>, other: &Piece<'_>, reach: f32) -> bool {
+    fn is_near(&mut self, own: &Piece<'_>, other: &EdgeRecord, reach: f32) -> bool {
         self.spent += PIECE_BOUND;
-        own.is_near(other.sphere(), reach)
+        own.is_near((Vec3::from_array(other.center), other.radius), reach)
     }
 
     /// The circle through a piece, which is kept in `known`; `None` for a straight one.
@@ -305,29 +484,25 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         &mut self,
         pair: &DirectedPair<'_>,
         node: &NodeRecord,
-        near: &[Piece<'_>],
+        near: &[(u32, &EdgeRecord)],
         mut least: f32,
     ) -> f32 {
-        if near.is_empty() {
-            return least;
-        }
         let rotation = pair.to_field.rotation();
         // Found where they are asked for.
         let mut circles: [Option<Circle>; NEAR_PIECES] = [const { None }; NEAR_PIECES];
         // Long enough that the distance, which costs more, is not asked for.
         let lasting = self.search.margin + DEEPEST_M + EARLY_M;
-        // A part that turns by an angle travels at least that times its radius.
-        let held = self.search.parts.get(usize::from(self.search.held));
-        let turn = held.map_or(0.0, |part| 1.0 / part.radius);
+        let turn = self.most_turn();
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
             let mut circle = None;
             self.spent += PIECE + EDGE_BOUND * near.len() as u32;
-            for (other, other_circle) in near.iter().zip(&mut circles) {
-                if !other.is_within(center, radius, least) || !self.is_near(&own, other, least) {
+            for ((_, other), other_circle) in near.iter().zip(&mut circles) {
+                if !is_within(other, center, radius, least) || !self.is_near(&own, other, least) {
                     continue;
                 }
+                let other = &Piece::fixed(other);
                 self.spent += CIRCLE_PAIR;
                 let travel = (self.circle(&mut circle, &own))
                     .and_then(|own| Some(own.travel(self.circle(other_circle, other)?, turn)));
@@ -341,6 +516,30 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
         }
         least
+    }
+
+    /// The most by which the held part turns for its travel, 1/m: a part that turns by an angle travels at least that times its radius.
+    fn most_turn(&self) -> f32 {
+        let held = self.search.parts.get(usize::from(self.search.held));
+        held.map_or(0.0, |part| 1.0 / part.radius)
+    }
+
+    /// What the object must travel until two pieces that were compared can touch, m; at most 0 where that is not known.
+    #[inline]
+    fn rest_m(&mut self, own: &Piece<'_>, other: &Piece<'_>, compared: Compared) -> f32 {
+        match compared {
+            Compared::Far(distance) => distance - DEEPEST_M,
+            Compared::Along(distance) => {
+                self.spent += 2 * CIRCLE + CIRCLE_PAIR;
+                let circles = Circle::of(own).zip(Circle::of(other));
+                let along = circles.map_or(0.0, |(own, other)| own.travel(&other, self.most_turn()));
+                larger(along, distance - DEEPEST_M)
+            }
+            // The distance of two edges that cross is their gap.
+            Compared::Crossing(gap) => gap,
+            Compared::Averted(angle) => angle / self.most_turn(),
+            Compared::Beside(rest_m) => rest_m,
+        }
     }
 
     /// Offers two edges that cross as a contact, unless they are too deep for a first touch.

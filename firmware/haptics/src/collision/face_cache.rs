@@ -76,6 +76,11 @@ impl FaceCache {
         }
     }
 
+    /// Travel at which the entry in the slot of a leaf expires, nm.
+    pub fn until(&self, leaf: Key) -> u32 {
+        self.slots[Self::place(leaf)].until_nm
+    }
+
     /// Stores the face of the selected points of a leaf, valid until the given travel.
     pub fn set(&mut self, leaf: Key, which: Points, face: Option<u16>, until_nm: u32) {
         self.slots[Self::place(leaf)] = Slot {

@@ -44,8 +44,9 @@ struct Gathered {
 /// Adds the face pairs of all pushing contacts to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes
 /// first.
 ///
-/// Contacts come in tree order, so the last pair is tried first. Cost: 30 instructions per contact, and 500 per pair that has an edge.
+/// Contacts come in tree order, so the last pair is tried first. Cost: 30 instructions per contact, 200 per pair, and 1000 for each of the deepest [`MAX_PAIRS`].
 pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) {
+    let mut sides = Sides::new(at);
     let mut gathered: Vec<Gathered, MAX_GATHERED> = Vec::new();
     let mut last = 0;
     for c in contacts.iter().filter(|c| c.phase != Phase::Free) {
@@ -60,24 +61,39 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
         };
         match found {
             Some(i) => last = i,
-            None if gathered.push(Gathered::new(c, at)).is_ok() => last = gathered.len() - 1,
+            None if gathered.push(Gathered::new(c, sides.of(c.leaf.part()))).is_ok() => {
+                last = gathered.len() - 1
+            }
             None => continue,
         }
         if let Some(g) = gathered.get_mut(last) {
             g.add(c, at);
         }
     }
-    let mut merged: Vec<Gathered, MAX_GATHERED> = Vec::new();
-    for g in &gathered {
-        let g = g.facing(at);
-        match merged.iter_mut().find(|m| m.is_like(&g)) {
-            Some(m) => m.merge(&g),
-            // Never exceeds the number gathered.
-            None => drop(merged.push(g)),
+    // What follows is done for the deepest alone.
+    let mut deepest: Vec<u8, MAX_GATHERED> = (0..gathered.len() as u8).collect();
+    let depth_m = |place: u8| gathered.get(usize::from(place)).map_or(0.0, |g| g.pair.depth_m);
+    deepest.sort_unstable_by(|a, b| depth_m(*b).total_cmp(&depth_m(*a)).then(a.cmp(b)));
+    deepest.truncate(MAX_PAIRS);
+    let mut merged: Vec<Gathered, MAX_PAIRS> = Vec::new();
+    for &place in &deepest {
+        let Some(g) = gathered.get_mut(usize::from(place)) else {
+            continue;
+        };
+        g.face(sides.of(g.pair.static_part));
+        match merged.iter_mut().find(|m| m.is_like(g)) {
+            Some(m) => m.merge(g),
+            // Never exceeds the number of the deepest.
+            None => drop(merged.push(g.clone())),
         }
     }
+    report(&merged, pairs);
+}
+
+/// Adds the pairs to those reported, deepest first.
+fn report(merged: &[Gathered], pairs: &mut FacePairs) {
     // Insertion into a sorted list of bounded length: at most MAX_GATHERED · MAX_PAIRS comparisons.
-    for g in &merged {
+    for g in merged {
         let p = FacePair {
             insertion_m: g.to - g.from,
             ..g.pair
@@ -97,12 +113,12 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
 
 impl Gathered {
     /// Pair of the faces of a contact, which is not added yet.
-    fn new(c: &Contact, at: &Scenery<'_, '_>) -> Self {
+    fn new(c: &Contact, sides: [Option<&Side<'_>>; 2]) -> Self {
         let (moving, fixed) = (
             [c.moving_face, c.moving_edge_face],
             [c.static_face, c.static_edge_face],
         );
-        let axis = at.axis(c.leaf.part(), &fixed, &moving);
+        let axis = axis_of(sides, &moving, &fixed);
         let along = c.arm.dot(axis);
         Self {
             pair: FacePair {
@@ -138,24 +154,21 @@ impl Gathered {
         }
     }
 
-    /// Copy in which, of two faces at an edge, the one that faces the other part comes first.
-    fn facing(&self, at: &Scenery<'_, '_>) -> Self {
-        let mut facing = self.clone();
-        let p = &mut facing.pair;
-        let turned = at.faces_along(at.held, [p.moving_face, p.moving_edge_face], p.point, -self.push);
-        [p.moving_face, p.moving_edge_face] = turned;
-        let turned = at.faces_along(
-            p.static_part,
-            [p.static_face, p.static_edge_face],
-            p.point,
-            self.push,
-        );
-        [p.static_face, p.static_edge_face] = turned;
-        if at.axis(p.static_part, &[p.static_face], &[p.moving_face]) == Vec3::ZERO {
-            // The axis belonged to the face beyond the edge.
-            (facing.from, facing.to) = (0.0, 0.0);
+    /// Puts first, of two faces at an edge, the one that faces the other part.
+    fn face(&mut self, sides: [Option<&Side<'_>>; 2]) {
+        let p = &mut self.pair;
+        if p.moving_edge_face == NO_FACE && p.static_edge_face == NO_FACE {
+            return;
         }
-        facing
+        let [held, other] = sides;
+        let moving = [p.moving_face, p.moving_edge_face];
+        let fixed = [p.static_face, p.static_edge_face];
+        [p.moving_face, p.moving_edge_face] = faces_along(held, moving, p.point, -self.push);
+        [p.static_face, p.static_edge_face] = faces_along(other, fixed, p.point, self.push);
+        if axis_of(sides, &[p.moving_face], &[p.static_face]) == Vec3::ZERO {
+            // The axis belonged to the face beyond the edge.
+            (self.from, self.to) = (0.0, 0.0);
+        }
     }
 
     fn is_like(&self, other: &Self) -> bool {
@@ -185,42 +198,83 @@ impl Gathered {
     }
 }
 
-impl Scenery<'_, '_> {
-    /// Exact surfaces and placement of a part.
-    fn surfaces(&self, part: u16) -> Option<(Surfaces<'_>, Pose)> {
+/// Exact surfaces of a part, and its placement.
+struct Side<'a> {
+    surfaces: Surfaces<'a>,
+    pose: Pose,
+    /// World to part.
+    back: Pose,
+}
+
+/// The held part and another one: the last that was asked for, since contacts come by parts.
+struct Sides<'s, 'a, 'i> {
+    at: &'s Scenery<'a, 'i>,
+    held: Option<Side<'a>>,
+    part: u16,
+    other: Option<Side<'a>>,
+}
+
+impl<'s, 'a, 'i> Sides<'s, 'a, 'i> {
+    fn new(at: &'s Scenery<'a, 'i>) -> Self {
+        Self {
+            at,
+            held: at.side(at.held),
+            part: at.held,
+            other: None,
+        }
+    }
+
+    /// The held part and this one.
+    fn of(&mut self, part: u16) -> [Option<&Side<'a>>; 2] {
+        if part != self.part || self.other.is_none() {
+            self.part = part;
+            self.other = self.at.side(part);
+        }
+        [self.held.as_ref(), self.other.as_ref()]
+    }
+}
+
+impl<'a> Scenery<'a, '_> {
+    fn side(&self, part: u16) -> Option<Side<'a>> {
         let index = usize::from(part);
         let pose = if part == self.held {
             self.object
         } else {
             self.parts.get(index)?.pose
         };
-        (index < self.scene.parts().len()).then(|| (self.scene.surfaces_of_part(index), pose))
+        (index < self.scene.parts().len()).then(|| Side {
+            surfaces: self.scene.surfaces_of_part(index),
+            pose,
+            back: pose.inverse(),
+        })
     }
+}
 
-    /// Axis (world) of the first of these static faces that is a cylinder or cone, else of the first such moving face, else zero.
-    fn axis(&self, static_part: u16, fixed: &[u16], moving: &[u16]) -> Vec3 {
-        let of = |part: u16, face: u16| {
-            let (surfaces, pose) = self.surfaces(part)?;
-            let face = surfaces.faces.get(usize::from(face))?;
-            let round = matches!(face.kind, surface_kind::CYLINDER | surface_kind::CONE);
-            round.then(|| pose.transform_vector(Vec3::from_array(face.axis)))
-        };
-        (fixed.iter().find_map(|&face| of(static_part, face)))
-            .or_else(|| moving.iter().find_map(|&face| of(self.held, face)))
-            .unwrap_or(Vec3::ZERO)
-    }
+/// Axis (world) of the first of these static faces that is a cylinder or cone, else of the first such moving face, else zero.
+fn axis_of([held, other]: [Option<&Side<'_>>; 2], moving: &[u16], fixed: &[u16]) -> Vec3 {
+    let of = |side: Option<&Side<'_>>, face: u16| {
+        let side = side?;
+        let face = side.surfaces.faces.get(usize::from(face))?;
+        let round = matches!(face.kind, surface_kind::CYLINDER | surface_kind::CONE);
+        round.then(|| side.pose.transform_vector(Vec3::from_array(face.axis)))
+    };
+    (fixed.iter().find_map(|&face| of(other, face)))
+        .or_else(|| moving.iter().find_map(|&face| of(held, face)))
+        .unwrap_or(Vec3::ZERO)
+}
 
-    /// Orders the two faces at an edge: first the one whose outward normal at `point` (world) points more along `direction`. Both need a closed form.
-    fn faces_along(&self, part: u16, [a, b]: [u16; 2], point: Vec3, direction: Vec3) -> [u16; 2] {
-        let along = |face: u16| {
-            let (surfaces, pose) = self.surfaces(part)?;
-            let back = pose.inverse();
-            let normal = on_surface_of(surfaces, face, back.transform_point(point))?.normal;
-            Some(normal.dot(back.transform_vector(direction)))
-        };
-        match (b != NO_FACE).then(|| along(a).zip(along(b))).flatten() {
-            Some((first, second)) if second > first => [b, a],
-            _ => [a, b],
-        }
+/// Orders the two faces at an edge: first the one whose outward normal at `point` (world) points more along `direction`. Both need a closed form.
+fn faces_along(side: Option<&Side<'_>>, [a, b]: [u16; 2], point: Vec3, direction: Vec3) -> [u16; 2] {
+    let Some(side) = side.filter(|_| b != NO_FACE) else {
+        return [a, b];
+    };
+    let (point, direction) = (
+        side.back.transform_point(point),
+        side.back.transform_vector(direction),
+    );
+    let along = |face: u16| Some(on_surface_of(side.surfaces, face, point)?.normal.dot(direction));
+    match along(a).zip(along(b)) {
+        Some((first, second)) if second > first => [b, a],
+        _ => [a, b],
     }
 }

@@ -11,6 +11,7 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Key, Points};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
+use crate::math::scalar::smaller;
 
 /// Leaves per tick whose decimated points are queried for their distance.
 const MAX_DECIMATED_QUERIES: u32 = 8;
@@ -32,15 +33,14 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     pub fn points(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, points: &[PointRecord]) -> Bound {
         let count = (self.left() as usize).min(points.len());
         let mut scan = LeafScan::new(self.search.near());
-        match self
-            .coherence
-            .cached_face(pair.keys.of(leaf.node), all_of(points))
-        {
+        let key = pair.keys.of(leaf.node);
+        match self.coherence.cached_face(key, all_of(points)) {
             CachedFace::Face(face) if count == points.len() && count <= Points::BITS as usize => {
                 scan.price = CACHED_POINT;
                 for point in points {
                     scan.add(self.on_cached_face(pair, leaf, point, face));
                 }
+                scan.beyond = smaller(scan.beyond, self.coherence.cached_face_rest(key));
             }
             _ => {
                 for point in points.iter().take(count) {

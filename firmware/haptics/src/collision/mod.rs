@@ -8,7 +8,7 @@
 //! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
 //! | `exact_surface`, `patch`, `facing` | distance to exact surfaces, and to local patches of free-form ones; normals that rule out a contact |
 //! | `span`, `span_search` | spans of sharp edges: the distance along one, and the place of it that touches |
-//! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
+//! | `coherence`, `node_key`, `ancestors`, `face_cache`, `edge_cache` | advancement bounds, cached faces and near pairs of edges kept from earlier ticks |
 //! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
 //! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
 //! | `contact`, `side`, `face_pairs` | bounded store of contacts; side from which a leaf came to a thin part; touching face pairs |
@@ -21,6 +21,7 @@ pub(crate) mod contact;
 pub mod cost;
 pub(crate) mod decimation;
 pub(crate) mod directed_pair;
+mod edge_cache;
 pub(crate) mod edge_crossing;
 mod edge_search;
 pub(crate) mod exact_surface;

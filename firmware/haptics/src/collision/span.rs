@@ -74,6 +74,12 @@ impl Span {
         self.middle
     }
 
+    /// Whether it is of a straight edge.
+    #[inline]
+    pub fn is_straight(&self) -> bool {
+        self.bend == Vec3::ZERO
+    }
+
     /// Distance from the middle within which it lies, m.
     #[inline]
     pub fn reach(&self) -> f32 {

@@ -10,7 +10,7 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::{APPROACH, LEAST_GRADIENT2, Search, Traversal};
 use crate::collision::span::{Course, IN_TICK, Near, Span};
-use crate::math::scalar::inverse_sqrt;
+use crate::math::scalar::{inverse_sqrt, smaller};
 
 /// Angle by which the normal of a surface turns along half a span, rad: as far as the span itself turns.
 const SPAN_TURN: f32 = 0.4;
@@ -33,6 +33,9 @@ where
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// As [`Traversal::point`], for a span of an edge: its lowest place is offered. `face`: the only one near the span, if known.
+    ///
+    /// A straight edge is one span however long it is: the search follows the surface below its middle, and another one may be nearer at an end. Hence what is
+    /// returned for it is a lower bound all along the span. Spans of curved edges are short, so that their middles are near the same face as their ends.
     #[inline(never)]
     pub fn span(
         &mut self,
@@ -50,10 +53,18 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         };
         let course = Course::new(pair.surfaces, &span, first);
         let bound = course.lower_bound(&span, face.is_some());
-        if bound > self.search.margin || !self.search.may_touch(pair, point, bound, first.found.normal) {
-            return bound;
+        let may_touch =
+            bound <= self.search.margin && self.search.may_touch(pair, point, bound, first.found.normal);
+        let gap = if may_touch {
+            self.lowest(pair, leaf, point, (&span, &course), face)
+        } else {
+            bound
+        };
+        if face.is_none() && span.is_straight() {
+            smaller(gap, first.found.distance - span.reach())
+        } else {
+            gap
         }
-        self.lowest(pair, leaf, point, (&span, &course), face)
     }
 
     /// As [`Self::span`], where the middle is outside of all cells: of [`PLACES`] places of the span the nearest is offered.
@@ -73,7 +84,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
         }
         if nearest.0 < self.search.margin {
-            return self.alone(pair, leaf, &pair.moved(point, nearest.1));
+            let _ = self.alone(pair, leaf, &pair.moved(point, nearest.1));
         }
         nearest.0 - span.longest(1.0 / PLACES as f32)
     }
