@@ -24,11 +24,8 @@ fn compare(fixed: Shape, moving: Shape, at: DVec3, goals: &[([f32; 3], f32, u32)
     ];
     let baked = bake(&model(parts), &options, &|_| ControlFlow::Continue(()));
     let image = baked.expect("it bakes").image;
-    let words: Vec<u32> = image
-        .chunks_exact(4)
-        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect();
-    let scene = SceneImage::open(bytemuck::cast_slice(&words)).expect("a scene");
+    let image = AlignedBytes::new(&image);
+    let scene = SceneImage::open(image.bytes()).expect("a scene");
     let mut settings = Settings::default();
     // Ample: where it runs out, what is found depends on what it takes.
     settings.contact.point_budget = 20_000;
@@ -106,7 +103,19 @@ proptest! {
     }
 }
 
-/// The test touches.
+/// A span whose middle is far and whose end is near: here one contact pushed where two did.
+#[test]
+fn a_long_edge_near_its_end_counts_as_near() {
+    let [along, across] = [DVec3::new(20.0, 1.5, 1.5), DVec3::new(1.5, 20.0, 1.5)];
+    let goals = [
+        ([0.004_475_004_5, 0.0, 0.0], -0.205_478_39, 138),
+        ([0.0, 0.0, -0.005_978_404], -0.131_781_46, 5),
+    ];
+    let touching = compare(block(along), block(across), DVec3::new(0.0, 0.0, 4.0), &goals);
+    assert!(touching > 0);
+}
+
+/// The motions of bars press them on each other.
 #[test]
 fn bars_pressed_on_each_other_touch() {
     let [along, across] = [DVec3::new(20.0, 1.5, 1.5), DVec3::new(1.5, 20.0, 1.5)];

@@ -22,11 +22,8 @@ fn edges(shape: Shape) -> Vec<EdgeRecord> {
         &|_| ControlFlow::Continue(()),
     );
     let image = baked.expect("it bakes").image;
-    let words: Vec<u32> = image
-        .chunks_exact(4)
-        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect();
-    let scene = SceneImage::open(bytemuck::cast_slice(&words)).expect("a scene");
+    let image = AlignedBytes::new(&image);
+    let scene = SceneImage::open(image.bytes()).expect("a scene");
     let shape = scene.shape(0);
     for node in shape.edge_nodes {
         let center = DVec3::from_array(node.center.map(f64::from));

@@ -46,7 +46,7 @@ struct Gathered {
 ///
 /// Contacts come in tree order, so the last pair is tried first. Cost: 30 instructions per contact, 200 per pair, and 1000 for each of the deepest [`MAX_PAIRS`].
 pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) {
-    let mut sides = Sides::new(at);
+    let mut parts = HeldAndOther::new(at);
     let mut gathered: Vec<Gathered, MAX_GATHERED> = Vec::new();
     let mut last = 0;
     for c in contacts.iter().filter(|c| c.phase != Phase::Free) {
@@ -61,7 +61,7 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
         };
         match found {
             Some(i) => last = i,
-            None if gathered.push(Gathered::new(c, sides.of(c.leaf.part()))).is_ok() => {
+            None if gathered.push(Gathered::new(c, parts.of(c.leaf.part()))).is_ok() => {
                 last = gathered.len() - 1
             }
             None => continue,
@@ -80,7 +80,7 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
         let Some(g) = gathered.get_mut(usize::from(place)) else {
             continue;
         };
-        g.face(sides.of(g.pair.static_part));
+        g.face(parts.of(g.pair.static_part));
         match merged.iter_mut().find(|m| m.is_like(g)) {
             Some(m) => m.merge(g),
             // Never exceeds the number of the deepest.
@@ -113,12 +113,12 @@ fn report(merged: &[Gathered], pairs: &mut FacePairs) {
 
 impl Gathered {
     /// Pair of the faces of a contact, which is not added yet.
-    fn new(c: &Contact, sides: [Option<&Side<'_>>; 2]) -> Self {
+    fn new(c: &Contact, parts: [Option<&PlacedSurfaces<'_>>; 2]) -> Self {
         let (moving, fixed) = (
             [c.moving_face, c.moving_edge_face],
             [c.static_face, c.static_edge_face],
         );
-        let axis = axis_of(sides, &moving, &fixed);
+        let axis = axis_of(parts, &moving, &fixed);
         let along = c.arm.dot(axis);
         Self {
             pair: FacePair {
@@ -155,17 +155,17 @@ impl Gathered {
     }
 
     /// Puts first, of two faces at an edge, the one that faces the other part.
-    fn face(&mut self, sides: [Option<&Side<'_>>; 2]) {
+    fn face(&mut self, parts: [Option<&PlacedSurfaces<'_>>; 2]) {
         let p = &mut self.pair;
         if p.moving_edge_face == NO_FACE && p.static_edge_face == NO_FACE {
             return;
         }
-        let [held, other] = sides;
+        let [held, other] = parts;
         let moving = [p.moving_face, p.moving_edge_face];
         let fixed = [p.static_face, p.static_edge_face];
         [p.moving_face, p.moving_edge_face] = faces_along(held, moving, p.point, -self.push);
         [p.static_face, p.static_edge_face] = faces_along(other, fixed, p.point, self.push);
-        if axis_of(sides, &[p.moving_face], &[p.static_face]) == Vec3::ZERO {
+        if axis_of(parts, &[p.moving_face], &[p.static_face]) == Vec3::ZERO {
             // The axis belonged to the face beyond the edge.
             (self.from, self.to) = (0.0, 0.0);
         }
@@ -199,7 +199,7 @@ impl Gathered {
 }
 
 /// Exact surfaces of a part, and its placement.
-struct Side<'a> {
+struct PlacedSurfaces<'a> {
     surfaces: Surfaces<'a>,
     pose: Pose,
     /// World to part.
@@ -207,42 +207,42 @@ struct Side<'a> {
 }
 
 /// The held part and another one: the last that was asked for, since contacts come by parts.
-struct Sides<'s, 'a, 'i> {
+struct HeldAndOther<'s, 'a, 'i> {
     at: &'s Scenery<'a, 'i>,
-    held: Option<Side<'a>>,
+    held: Option<PlacedSurfaces<'a>>,
     part: u16,
-    other: Option<Side<'a>>,
+    other: Option<PlacedSurfaces<'a>>,
 }
 
-impl<'s, 'a, 'i> Sides<'s, 'a, 'i> {
+impl<'s, 'a, 'i> HeldAndOther<'s, 'a, 'i> {
     fn new(at: &'s Scenery<'a, 'i>) -> Self {
         Self {
             at,
-            held: at.side(at.held),
+            held: at.placed_surfaces(at.held),
             part: at.held,
             other: None,
         }
     }
 
     /// The held part and this one.
-    fn of(&mut self, part: u16) -> [Option<&Side<'a>>; 2] {
+    fn of(&mut self, part: u16) -> [Option<&PlacedSurfaces<'a>>; 2] {
         if part != self.part || self.other.is_none() {
             self.part = part;
-            self.other = self.at.side(part);
+            self.other = self.at.placed_surfaces(part);
         }
         [self.held.as_ref(), self.other.as_ref()]
     }
 }
 
 impl<'a> Scenery<'a, '_> {
-    fn side(&self, part: u16) -> Option<Side<'a>> {
+    fn placed_surfaces(&self, part: u16) -> Option<PlacedSurfaces<'a>> {
         let index = usize::from(part);
         let pose = if part == self.held {
             self.object
         } else {
             self.parts.get(index)?.pose
         };
-        (index < self.scene.parts().len()).then(|| Side {
+        (index < self.scene.parts().len()).then(|| PlacedSurfaces {
             surfaces: self.scene.surfaces_of_part(index),
             pose,
             back: pose.inverse(),
@@ -251,12 +251,12 @@ impl<'a> Scenery<'a, '_> {
 }
 
 /// Axis (world) of the first of these static faces that is a cylinder or cone, else of the first such moving face, else zero.
-fn axis_of([held, other]: [Option<&Side<'_>>; 2], moving: &[u16], fixed: &[u16]) -> Vec3 {
-    let of = |side: Option<&Side<'_>>, face: u16| {
-        let side = side?;
-        let face = side.surfaces.faces.get(usize::from(face))?;
+fn axis_of([held, other]: [Option<&PlacedSurfaces<'_>>; 2], moving: &[u16], fixed: &[u16]) -> Vec3 {
+    let of = |part: Option<&PlacedSurfaces<'_>>, face: u16| {
+        let part = part?;
+        let face = part.surfaces.faces.get(usize::from(face))?;
         let round = matches!(face.kind, surface_kind::CYLINDER | surface_kind::CONE);
-        round.then(|| side.pose.transform_vector(Vec3::from_array(face.axis)))
+        round.then(|| part.pose.transform_vector(Vec3::from_array(face.axis)))
     };
     (fixed.iter().find_map(|&face| of(other, face)))
         .or_else(|| moving.iter().find_map(|&face| of(held, face)))
@@ -264,15 +264,20 @@ fn axis_of([held, other]: [Option<&Side<'_>>; 2], moving: &[u16], fixed: &[u16])
 }
 
 /// Orders the two faces at an edge: first the one whose outward normal at `point` (world) points more along `direction`. Both need a closed form.
-fn faces_along(side: Option<&Side<'_>>, [a, b]: [u16; 2], point: Vec3, direction: Vec3) -> [u16; 2] {
-    let Some(side) = side.filter(|_| b != NO_FACE) else {
+fn faces_along(
+    part: Option<&PlacedSurfaces<'_>>,
+    [a, b]: [u16; 2],
+    point: Vec3,
+    direction: Vec3,
+) -> [u16; 2] {
+    let Some(part) = part.filter(|_| b != NO_FACE) else {
         return [a, b];
     };
     let (point, direction) = (
-        side.back.transform_point(point),
-        side.back.transform_vector(direction),
+        part.back.transform_point(point),
+        part.back.transform_vector(direction),
     );
-    let along = |face: u16| Some(on_surface_of(side.surfaces, face, point)?.normal.dot(direction));
+    let along = |face: u16| Some(on_surface_of(part.surfaces, face, point)?.normal.dot(direction));
     match along(a).zip(along(b)) {
         Some((first, second)) if second > first => [b, a],
         _ => [a, b],

@@ -27,7 +27,7 @@ const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 /// Largest processor time of drawing in an idle minute by software, in times of [`bake_s`] on the same computer, whose speed cancels out.
 const DRAWING_MAX: f64 = 1.5;
 /// Largest processor time of the program's own threads in an idle minute, in times of [`waits_s`] in the same minute. They wait, a thousand times a second
-/// for the rig's ticks: how long the system takes for that differs by more than a factor of two, even on one computer from day to day.
+/// for the rig's ticks: what the system takes for that differs by nearly a factor of two, even on one computer from day to day.
 const WAITING_MAX: f64 = 3.0;
 /// What the names of these threads begin with; the main thread draws, and those of the renderer.
 const OWN_THREADS: &str = "mortise-";
